@@ -11,7 +11,7 @@ import robot_dyn as rd
 
 arm = rd.load("planar_2r")
 q, v = np.array([0.3, -0.8]), np.array([0.5, 0.4])
-for dynamics in (rd.Lagrangian(arm), rd.Compiled(arm)):
+for dynamics in (rd.Lagrangian(arm), rd.compiled(arm)):
     for ours, theirs in ((dynamics.M(q), arm.M(q)), (dynamics.C(q, v) @ v, arm.C(q, v) @ v), (dynamics.N(q), arm.N(q))):
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12)
 assert rd.compare(rd.load("panda")).ok
@@ -20,7 +20,7 @@ plant, controller = (
     rd.Plant(arm, [rd.effects.ViscousFriction(0.1)]),
     rd.control.PD(rd.control.quintic(q, q + 0.5, 0.1), 40.0, 4.0),
 )
-setup = rd.Setup(plant, q, duration_s=0.2, controller=controller, integrator="rk4")
+setup = rd.Setup(plant, q, duration_s=0.2, controller=controller, method="RK4")
 runs = [rd.simulate(setup, engine=each) for each in ("interpreted", "compiled")]
 np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-11)
 many = rd.rollouts(setup, np.tile(q, (3, 1)))

@@ -25,9 +25,9 @@ def fall(q0):
         q0=q0,
         v0=[0.0, 0.0],
         duration_s=10.0,
-        integrator="order_8",
+        method="DP8",
         step_s=0.005,  # with shorter ones the error is that of rounding, which the motion magnifies
-        record_period_s=0.01,
+        record_every_s=0.01,
     )
 
 

@@ -42,12 +42,13 @@ for carried, arm in arms.items():
             v0=np.zeros(arm.n),
             duration_s=duration_s,
             controller=controller,
-            integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),
-            record_period_s=0.01,
+            rtol=1e-8,
+            atol=1e-10,
+            record_every_s=0.01,
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")
         error = np.abs(trajectory.q - trajectory.desired).max(axis=1)
-        rows.append((f"{name}, {carried}", trajectory.tracking_error, error[-1]))
+        rows.append((f"{name}, {carried}", trajectory.rms_tracking_error, error[-1]))
 
 print(f"what the payload costs at rest: {(arms['2 kg in the hand'].N(q_end) - model.N(q_end)).round(2)} N m")
 print(f"{'':<34} {'rms [rad]':>12} {'at the end [rad]':>17}")

@@ -30,7 +30,7 @@ trajectory = rd.simulate(
     q0=[q0],
     v0=[0.0],
     duration_s=periods * T,
-    integrator="order_8",
+    method="DP8",
     step_s=0.01,
 )
 print(trajectory.summary)

@@ -30,9 +30,9 @@ def move(arm):
         v0=np.zeros(2),
         duration_s=5.0,
         controller=rd.control.PD(rd.control.hold(target), kp, kd),
-        integrator="order_8",
+        method="DP8",
         step_s=0.002,
-        record_period_s=0.01,
+        record_every_s=0.01,
     )
 
 

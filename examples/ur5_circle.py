@@ -36,8 +36,9 @@ for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mas
         v0=np.zeros(arm.n),
         duration_s=circle.position.end,
         controller=rd.control.OperationalSpace(model, frame, circle, kp, kd),
-        integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),
-        record_period_s=0.01,
+        rtol=1e-8,
+        atol=1e-10,
+        record_every_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}")
 

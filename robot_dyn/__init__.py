@@ -1,7 +1,7 @@
 """Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ, by Pinocchio and a Lagrangian.
 
 An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q)`, …
-Other formulations  Lagrangian, Compiled, euler_lagrange
+Other formulations  Lagrangian, compiled, euler_lagrange
 What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
@@ -18,14 +18,10 @@ from __future__ import annotations
 
 from robot_dyn.foundations.public import public_names
 
-TYPE_CHECKING = False  # as of typing, whose import takes longer than all of this
-if TYPE_CHECKING:
-    from typing import Any
-
 _public, _, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 

@@ -32,7 +32,7 @@ if __name__ == "__main__":
     if unknown := set(options.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
     if options.quick:
-        say(rd.accuracy.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0))
+        say(rd.accuracy.work_precision(setup("pendulum"), methods=["DOP853", "RK4"], budget_s=2.0))
     for each in () if options.quick else options.scenes:
         print(f"\n## {each}\n", flush=True)
         result = rd.accuracy.work_precision(setup(each), budget_s=options.budget)

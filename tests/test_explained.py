@@ -91,7 +91,7 @@ def test_gravity_and_types_of_joints_are_those_of_file_and_edits() -> None:
 
 
 @pytest.mark.parametrize(
-    "engine", [rd.load, lambda name: rd.Lagrangian(rd.load(name)), lambda name: rd.Compiled(rd.load(name))]
+    "engine", [rd.load, lambda name: rd.Lagrangian(rd.load(name)), lambda name: rd.compiled(rd.load(name))]
 )
 def test_total_energy_changes_by_the_power_of_the_torque(engine) -> None:
     """dE/dt = vᵀ τ; a central difference along the motion, h = 1e-5: error some 200 h² and 1e-16 E/h, below 1e-6."""
@@ -103,7 +103,7 @@ def test_total_energy_changes_by_the_power_of_the_torque(engine) -> None:
     assert arm.total_energy(np.tile(q, (3, 1)), v).shape == (3,)
 
 
-@pytest.mark.parametrize("engine", [lambda robot: robot, rd.Lagrangian, rd.Compiled], ids=["Robot", "own", "compiled"])
+@pytest.mark.parametrize("engine", [lambda robot: robot, rd.Lagrangian, rd.compiled], ids=["Robot", "own", "compiled"])
 def test_the_frame_of_a_joint_is_that_of_its_child_link(engine) -> None:
     """Also of fixed and locked joints."""
     robot = rd.load("ur5").with_(lock={"elbow_joint": 0.4})

@@ -16,7 +16,7 @@ for file in pathlib.Path(control.__file__).parent.glob('*.py'):
 SHOWN = """import robot_dyn as rd
 arm, q = rd.load('pendulum'), [0.1]
 rd.compare(arm, samples=1)._repr_html_()
-rd.plot(rd.simulate(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3))._repr_png_()
+rd.plot(rd.simulate(arm, q, duration_s=0.1, method='RK4', step_s=1e-3))._repr_png_()
 rd.accuracy.cost(arm, q, budget_s=0.1, repeats=1)._repr_html_()"""
 ARM = "import robot_dyn as rd; arm = rd.load('pendulum'); "
 HEAVY = {"numba", "llvmlite", "casadi", "flint", "matplotlib", "scipy", "meshcat", "trimesh", "pydantic", "typer"}

@@ -23,12 +23,12 @@ MOST_TEXT, MOST_HTML = 8000, 250_000  # characters
 CELLS = {
     "compare": "rd.compare(arm, samples=5)",
     "check": "rd.tools.doctor.check('kinova')",
-    "advise": "rd.advise(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3)",
+    "advise": "rd.advise(arm, q, duration_s=0.1, method='RK4', step_s=1e-3)",
     "prove": "rd.tools.proof.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
     "certify": "rd.accuracy.certify(arm, samples=100, repeats=1)",
     "cost": "rd.accuracy.cost(arm, q, budget_s=0.1, repeats=2)",
     "work_precision": "rd.accuracy.work_precision(rd.Setup(rd.Plant(arm), q, duration_s=0.1),"
-    " methods=['rk4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
+    " methods=['RK4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
     "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=1.0)",
     "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
     "info": "rd.info(rd.load('panda'))",
@@ -93,7 +93,7 @@ def test_the_columns_that_identify_a_row_stand_in_each_part_of_a_split_table() -
 def test_a_table_of_long_texts_is_broken_between_words_only(width: int) -> None:
     """Every word, headings included, fits the width of its column, and the columns fit the line."""
     text = "the push grew 1.2e+04-fold (beyond limit of file, error told up to 0.129 s only)"
-    rows = (("step", "rosenbrock_5", 0.1, text, text), ("step", "time_stepping", 0.25, "", text))
+    rows = (("step", "Rodas5PFixed", 0.1, text, text), ("step", "MoreauJean", 0.25, "", text))
     table = Table(("of", "what", "value", "at 0.98 of value", "at 1.02 of value"), rows, wrap=True)
     for part in table.within(width):
         fitted = part.fitted(width)
@@ -129,7 +129,7 @@ def test_a_linearisation_is_the_pair_of_its_matrices() -> None:
     assert {complex(*row) for row in shown} == {complex(x) for x in known}
 
 
-RUN = "rd.simulate(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3)"
+RUN = "rd.simulate(arm, q, duration_s=0.1, method='RK4', step_s=1e-3)"
 PARTS: dict[str, Callable[[Any], Any]] = {
     "run": lambda run: run,
     "ledger": lambda run: run.ledger,
@@ -137,7 +137,7 @@ PARTS: dict[str, Callable[[Any], Any]] = {
     "agreement": lambda _: made("compare").worst,
     "finding": lambda _: made("check").findings[0],
     "coriolis": lambda _: ARM.coriolis,
-    "observed": lambda _: rd.rollouts(ARM, [Q, Q], duration_s=0.1, integrator="rk4", step_s=1e-3).observed,
+    "observed": lambda _: rd.rollouts(ARM, [Q, Q], duration_s=0.1, method="RK4", step_s=1e-3).observed,
     "event": lambda _: rd.Event(lambda t, q, v: q[0]),
     "payload": lambda _: rd.Payload("tip", 1.0),
     "robot": lambda _: ARM,
@@ -147,7 +147,7 @@ PARTS: dict[str, Callable[[Any], Any]] = {
 
 @pytest.mark.parametrize("name", list(PARTS))
 def test_the_repr_of_what_is_around_results_is_short(name: str) -> None:
-    text = repr(PARTS[name](rd.simulate(ARM, Q, duration_s=0.1, integrator="rk4", step_s=1e-3)))
+    text = repr(PARTS[name](rd.simulate(ARM, Q, duration_s=0.1, method="RK4", step_s=1e-3)))
     assert len(text) < 800 and "array(" not in text and "0x" not in text
 
 
@@ -237,7 +237,7 @@ def test_a_robot_shows_its_joints_limits_and_findings() -> None:
 
 
 def test_a_run_shows_its_summary_and_curves_of_its_samples() -> None:
-    run = rd.simulate(LOADED, [0.3, 0.4], duration_s=0.5, integrator="rk4", step_s=1e-3)
+    run = rd.simulate(LOADED, [0.3, 0.4], duration_s=0.5, method="RK4", step_s=1e-3)
     assert repr(run) == f"<Trajectory: {run.summary}>" and len(repr(run)) < 1000
     page = read(run._repr_html_())
     assert run.summary in page.text_content()
@@ -251,7 +251,7 @@ def test_a_run_shows_its_summary_and_curves_of_its_samples() -> None:
 
 
 def test_a_batch_shows_the_range_of_its_runs() -> None:
-    runs = rd.rollouts(LOADED, [[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]], duration_s=0.1, integrator="rk4", step_s=1e-3)
+    runs = rd.rollouts(LOADED, [[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]], duration_s=0.1, method="RK4", step_s=1e-3)
     assert repr(runs) == f"<Rollouts: {runs.summary}>"
     page = read(runs._repr_html_())
     assert runs.summary in page.text_content()

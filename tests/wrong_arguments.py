@@ -46,7 +46,7 @@ FOR_AUTHORS = {
     "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
     "TaskDynamics", "ButcherTableau", "RosenbrockTable", "Surd", "System",
     "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
-    "Gauss", "Rosenbrock", "TimeStepping",
+    "GaussLegendre", "Rosenbrock", "MoreauJean",
 }  # fmt: skip
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, rd.control.Block, Arithmetic)
@@ -112,11 +112,11 @@ def examples(folder: Path) -> dict[str, Example]:
     friction, hold = rd.effects.ViscousFriction(0.1), rd.control.hold(q)
     certified = rd.accuracy.certify(robot, samples=100, repeats=1)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
-    setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
+    setup = rd.Setup(plant, q, duration_s=0.01, method="RK4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
     proven = rd.tools.proof.prove(setup, bits=53)
     measured = rd.accuracy.work_precision(
-        replace(setup, engine="interpreted"), methods=["rk4"], budget_s=2.0, repeats=1
+        replace(setup, engine="interpreted"), methods=["RK4"], budget_s=2.0, repeats=1
     )
     priced = rd.accuracy.cost(setup, budget_s=1e-9, repeats=1)
     saved, scene, urdf = run.save(folder / "run"), folder / "scene.toml", folder / "arm.urdf"
@@ -124,7 +124,7 @@ def examples(folder: Path) -> dict[str, Example]:
     urdf.write_bytes(robot.description.xml)
     of_sweep = folder / "of_sweep.toml"
     start = '{q0 = "normal(mean=[0.1, 0.2], sd=0.1)"}'
-    of_sweep.write_text(f'{scene.read_text()}method = "rk4"\n[sweep]\nruns = 48\nvary = {start}\n', encoding="utf-8")
+    of_sweep.write_text(f'{scene.read_text()}method = "RK4"\n[sweep]\nruns = 48\nvary = {start}\n', encoding="utf-8")
     sweep = rd.tools.sweeps.from_scene(of_sweep, figures={"end": rd.tools.sweeps.final("q", "slide")})
     swept = rd.tools.sweeps.run(sweep, folder / "sweep", threads=1, chunk=16)
     table, motors = folder / "samples.csv", folder / "motors.csv"
@@ -152,12 +152,12 @@ def examples(folder: Path) -> dict[str, Example]:
     path: Any = rd.control.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     made |= {thing.__name__: (thing, arguments(thing)) for thing in (*EFFECTS.values(), rd.effects.joint_stops)}
     calls = [
-        call(rd.integrate.Adaptive, method="Rosenbrock", rtol=1e-8, atol=1e-9, max_step_s=0.5),
+        call(rd.integrate.Adaptive, method="Rodas5P", rtol=1e-8, atol=1e-9, max_step_s=0.5),
         call(adaptive.solve, system=system, t0=0.0, y0=q, t1=1.0, stop=lambda t, y: 1.0),
         call(adaptive.steps, system=system, t0=0.0, y0=q, t1=1.0, stop=lambda t, y: 1.0),
         call(adaptive.with_tolerances, factor=10.0, longest_s=0.5),
         call(rd.accuracy.Ball, bits=53),
-        call(rd.Compiled, robot_or_plant=robot, dtype="float64", threads=1, cache=False),
+        call(rd.compiled, robot_or_plant=robot, dtype="float64", threads=1, cache=False),
         call(rd.control.ComputedTorque, **pair),
         call(rd.control.Differences),
         call(rd.Event, function=lambda t, q, v: 1.0, direction=1, terminal=True, name="high"),
@@ -191,15 +191,15 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.PiecewisePolynomial, breaks=[0.0, 1.0], coefficients=[[[0.1], [0.2]]]),
         call(hold.at, t=0.1),
         call(rd.Plant, dynamics=robot, effects=[friction]),
-        call(plant.C, q=q, v=v),
-        call(plant.M, q=q),
-        call(plant.N, t=0.1, q=q, v=v),
+        call(plant.C, q=q, v=v, t=0.1),
+        call(plant.M, q=q, t=0.1),
+        call(plant.N, q=q, v=v, t=0.1),
         call(plant.at, t=0.1),
         call(plant.actuation, u=u),
-        call(plant.forward_dynamics, t=0.1, q=q, v=v, u=u),
-        call(plant.held, t=0.1, q=q, v=v, u=u),
-        call(plant.inverse_dynamics, t=0.1, q=q, v=v, a=u),
-        call(plant.torque, t=0.1, q=q, v=v),
+        call(plant.forward_dynamics, q=q, v=v, u=u, t=0.1),
+        call(plant.held, q=q, v=v, u=u, t=0.1),
+        call(plant.inverse_dynamics, q=q, v=v, a=u, t=0.1),
+        call(plant.torque, q=q, v=v, t=0.1),
         call(rd.Robot, description=robot.description, edits=robot.edits),
         call(robot.announced),
         call(rd.Robot.from_pinocchio, model=robot.model),
@@ -215,7 +215,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.Samples, t=[0.0, 0.5, 1.0], q=points, v=points, a=points),
         call(rd.control.Samples([0.0, 0.5, 1.0], points).at, t=0.1),
         call(rd.Setup, plant=plant, q0=q, v0=v, duration_s=0.1, controller=rd.control.PD(hold, 1.0, 1.0),
-            integrator=rd.integrate.method("rk4"), step_s=1e-3, record_period_s=0.01, estimate_error=True,
+            method=rd.integrate.method("RK4"), step_s=1e-3, record_every_s=0.01, estimate_error=True,
             about={"note": "text"}, engine="interpreted"),
         call(rd.effects.Layer, joint=1, width=0.01, level=0.5, of_velocity=True),
         call(rd.effects.Threshold, joint=1, level=0.5, name="stop", rising="touched", falling="left",
@@ -257,7 +257,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.read, path=saved),
         call(rd.compare_runs, a=several[0], b=several[0]),
         call(several.save, path=folder / "table.csv"),
-        call(rd.integrate.method, name="rk4"),
+        call(rd.integrate.method, name="RK4"),
         call(rd.accuracy.midpoint, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
@@ -299,7 +299,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.sweeps.normal, mean=1.0, sd=0.1),
         call(rd.tools.sweeps.peak, of_what="v", joint="slide"),
         call(rd.tools.sweeps.read_sweep, folder=folder / "sweep", scene=of_sweep, figures={}),
-        call(rd.tools.sweeps.rms_error, joint="slide"),
+        call(rd.tools.sweeps.rms_tracking_error, joint="slide"),
         call(rd.tools.sweeps.run, sweep=swept.sweep, folder=folder / "sweep", threads=1, chunk=16,
             on_progress=print_nothing),
         call(rd.tools.sweeps.triangular, low=0.0, mode=0.5, high=1.0),
@@ -318,7 +318,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(measured.digits, error=1e-6),
         call(measured.sentence_of, digits=6),
         call(rd.accuracy.work_precision, what=replace(setup, engine="interpreted"), q0=q, v0=v, duration_s=0.01,
-            methods=["rk4"], peers=False, budget_s=2.0, repeats=1, on_progress=print_nothing),
+            methods=["RK4"], peers=False, budget_s=2.0, repeats=1, on_progress=print_nothing),
         call(rd.control.via_points, times_s=[0.0, 0.5, 1.0], points=points, kind="cubic"),
     ]  # fmt: skip
     named: dict[str, Example] = {  # whose first argument is by position

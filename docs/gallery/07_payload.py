@@ -13,5 +13,5 @@ plan = rd.control.quintic(start, start + np.array([0.9, 0.3, -0.4, 0.1, 0.0, 0.0
 kp, kd = rd.control.gains_from(1.0, frequency=15.0)
 load = rd.effects.CarriedPayload(rd.Payload("tool0", 3.0), start_s=0.5, end_s=1.6)
 law = rd.control.ComputedTorque(arm, plan, kp, kd)
-run = rd.simulate(rd.Plant(arm, [load]), start, duration_s=2.5, controller=law, record_period_s=0.01)
+run = rd.simulate(rd.Plant(arm, [load]), start, duration_s=2.5, controller=law, record_every_s=0.01)
 page = rd.replay(run, frame="tool0", meshes="coarse")

@@ -1,6 +1,6 @@
 """Watt's governor.
 
-The couplers are so stiff that a deviation decays within 0.12 ms; Rosenbrock steps are longer than that.
+The couplers are so stiff that a deviation decays within 0.12 ms; the steps of Rodas5P are longer than that.
 """
 
 from pathlib import Path
@@ -13,5 +13,5 @@ with TemporaryDirectory() as folder:
     scene = Path(folder, "governor.toml")
     scene.write_text(starter("flyball_governor"), encoding="utf-8")
     setup = rd.read_scene(scene)
-run = rd.simulate(setup, integrator=rd.integrate.Adaptive("Rosenbrock", rtol=1e-6, atol=1e-8), record_period_s=0.02)
+run = rd.simulate(setup, method="Rodas5P", rtol=1e-6, atol=1e-8, record_every_s=0.02)
 page = rd.replay(run)

@@ -13,5 +13,5 @@ plan = rd.control.quintic(start, start + np.array([0.5, -0.6, 0.5, 0.4, 0.0, 0.0
 kp, kd = rd.control.gains_from(1.0, frequency=15.0)
 law = rd.control.ComputedTorque(arm, plan, kp, kd)
 plant = rd.Plant(arm, [rd.effects.EffortLimit("urdf"), rd.effects.ViscousFriction(0.2)])
-run = rd.simulate(plant, start, duration_s=2.0, controller=law, record_period_s=0.01)
+run = rd.simulate(plant, start, duration_s=2.0, controller=law, record_every_s=0.01)
 page = rd.replay(run, meshes="coarse")

@@ -15,5 +15,5 @@ loop = control.Loop(
     measurement_delay=1.0,
     actuation_delay=0.5,
 )
-run = rd.simulate(arm, [0.2, -0.4], duration_s=1.0, controller=loop, record_period_s=0.005)
+run = rd.simulate(arm, [0.2, -0.4], duration_s=1.0, controller=loop, record_every_s=0.005)
 page = rd.replay(run, frame="tip")

@@ -17,8 +17,8 @@ EXAMPLES = {
         "growth": "1.31", "period_s": 0.01, "start": 0.0, "over_run": "5.2e+11", "limit_s": 0.0062, "shorter_s": "0.003"
     },
     Reason.STEP_TOO_LONG: {
-        "value": 0.01, "limit": 0.004, "method": "rk4", "step_s": "0.002",
-        "motion": "the fastest motion changes with 710 per second, of joint 'elbow_joint', by 'joint_stops'",
+        "value": 0.01, "limit": 0.004, "method": "RK4", "step_s": "0.002",
+        "motion": "changes", "rate_per_s": 710.0, "moving_joint": "elbow_joint", "source": "joint_stops",
     },
     Reason.IMPLAUSIBLE_SPEED: {"value": 640.0, "limit": 3.15, "unit": "rad/s", "step_s": 0.002},
     Reason.ENERGY_WITHOUT_SOURCE: _STEP,
@@ -27,14 +27,14 @@ EXAMPLES = {
     Reason.STEP_BELOW_FLOAT_SPACING: _LARGEST,
     Reason.STALLED: {
         "steps": 2600, "advanced_s": 3e-4, "remaining": 1e7,
-        "remedy": "Rosenbrock, softer effects or a larger tolerance",
+        "remedy": "Rodas5P, softer effects or a larger tolerance",
     },
     Reason.STAGES_NOT_FOUND: {
-        "error": "gauss: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a smaller "
-        "step, or a method for stiff systems"
+        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a "
+        "smaller step, or a method for stiff systems"
     },
     Reason.EVENTS_ACCUMULATE: {
-        "changes": 1000, "span_s": 2.1e-10, "remedy": "integrator='time_stepping' and a step_s"
+        "changes": 1000, "span_s": 2.1e-10, "remedy": "method='MoreauJean' and a step_s"
     },
     Reason.TORQUE_NOT_FINITE: _STEP,
     Reason.CANNOT_EVALUATE: {

@@ -130,7 +130,7 @@ class Advice(Answer):
         if self.step_s <= limit:
             return f"step {self.step_s:.3g} s: stable; {self.method} is up to {limit:.3g} s"
         best = max(FIXED_STEP, key=lambda name: (min(self.limits[name], 2 * self.step_s), method(name).order))
-        other = f", or integrator={best!r}" if self.limits[best] >= self.step_s else ""
+        other = f", or method={best!r}" if self.limits[best] >= self.step_s else ""
         return (
             f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: take"
             f" step_s={below(limit)}{other}"
@@ -181,7 +181,7 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
     """
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
     advice = advice_about(setup, _along)
-    worthwhile = advice.growth < _BEARS and (setup.integrator.controls_error or setup.steps <= _MOST_STEPS)
+    worthwhile = advice.growth < _BEARS and (setup.method.controls_error or setup.steps <= _MOST_STEPS)
     return replace(advice, run=simulate(replace(setup, estimate_error=True))) if worthwhile else advice
 
 
@@ -201,11 +201,12 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
     motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
-    n, own = plant.dynamics.n, setup.integrator
+    n, own = plant.dynamics.n, setup.method
     methods = {name: method(name) for name in FIXED_STEP} | ({} if own.controls_error else {own.name: own})
     limits = {name: min(longest_step(each, J, n) for J in matrices) for name, each in methods.items()}
     step = 0.0 if own.controls_error else setup.taken_step_s
-    loops = [linearised(plant, setup.controller, t, _own(loop, y)) for t, y in states if period]
+    sampled = [] if controller is None or not period else [(controller, t, _own(loop, y)) for t, y in states]
+    loops = [linearised(plant, *state) for state in sampled]
     factors = [after(each.factor(period), periods(duration, period)) for each in loops]
     factors += [exp(min(max(0.0, excess_rate(own, J, n)(step)) * duration, LARGEST)) for J in matrices if step]
     return Advice(
@@ -232,8 +233,8 @@ def _along(setup: Setup, loop: StateEquation) -> list[State]:
     """Times and states y along a run with control at all times."""
     run = simulate(
         Setup(
-            setup.plant, setup.q0, setup.v0, setup.duration_s, loop.controller, engine=setup.engine,
-            record_period_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
+            setup.plant, setup.q0, setup.v0, duration_s=setup.duration_s, controller=loop.controller,
+            engine=setup.engine, record_every_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
         )
     )  # fmt: skip
     z = [] if run.controller_states is None else [run.controller_states]

@@ -17,6 +17,7 @@ from robot_dyn.model.robot import Robot, info
 from robot_dyn.queries.dynamics import QUANTITIES
 from robot_dyn.queries.units import numbers_row
 from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.trajectory import Trajectory
 
@@ -46,16 +47,22 @@ def run(trajectory: Trajectory) -> Document:
         "work": {name: work[-1] for name, work in trajectory.ledger.work.items()},
         "ledger_residual": largest(np.abs(trajectory.ledger.residual)),
         "ledger_closure": trajectory.ledger.closure,
+        "ledger_doubt": None if trajectory.ledger.cause is None else _doubt(trajectory.ledger.cause),
         "error_largest": None if error is None else error.largest,
         "error_until_s": None if error is None else error.until_s,
         "error_verdict": None if error is None else error.verdict,
-        "error_note": None if error is None else error.note or error.reason,
-        "tracking_error": trajectory.tracking_error,
+        "error_doubts": [] if error is None else [_doubt(x) for x in (error.ends_early, error.no_order) if x],
+        "rms_tracking_error": trajectory.rms_tracking_error,
         "accuracy": trajectory.accuracy,
         "remarks": [_remark(remark) for remark in trajectory.remarks],
         "extremes": _extremes(trajectory),
         "statistics": trajectory.statistics,
     }
+
+
+def _doubt(doubt: Doubt) -> Document:
+    """Return a doubt and its sentences."""
+    return vars(doubt) | {"text": doubt.text, "remedy": doubt.remedy}
 
 
 def _remark(remark: Remark) -> Document:

@@ -10,12 +10,15 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from robot_dyn.foundations.answer import Answer, Table
 from robot_dyn.foundations.errors import RobotDynError, escaped
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 _MOST = 4000  # characters of a message
 
@@ -118,7 +121,7 @@ def put(text: str) -> None:
     _guarded(lambda: (sys.stdout.write(text), sys.stdout.flush()))
 
 
-def say_json(value: Any, **more: Any) -> None:
+def say_json(value: DataclassInstance | Mapping[str, object], **more: object) -> None:
     """Print a document or a result as JSON, with more keys; errors as of `say`."""
     from robot_dyn.foundations.result import json_text, plain
 

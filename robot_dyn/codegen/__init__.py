@@ -8,7 +8,7 @@ store/                keys of machine code, their dependencies, and the folder t
 kernel, threads       machine code of one function of states, over batches and threads
 self_check            compare a new kernel with an independent implementation
 engine                kernels by quantity, each on first use; general arguments and doubtful states
-dynamics, plant       the user's objects: `Compiled` of a robot or a plant; derivatives: an interpreted substitute
+dynamics, plant       the user's objects: `compiled` of a robot or a plant; derivatives: an interpreted substitute
 loops/                translate plain functions, such as the loops of a run, from their syntax trees
 primitives            whole-array functions of loops, built from the instructions of array_operations
 waiting               a message during a long compilation, and delayed Ctrl-C

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from llvmlite import ir
@@ -17,7 +17,7 @@ from robot_dyn.codegen.llvm.vectors import Vectors
 from robot_dyn.codegen.loops import arrays, vectors
 from robot_dyn.codegen.loops.kinds import BOOL, F64, FLOAT, I8, INT
 from robot_dyn.codegen.loops.numbers import converted, real, scalar, truth
-from robot_dyn.codegen.loops.values import ArrayValue, Scalar, StaticValue, Value
+from robot_dyn.codegen.loops.values import UNWRITTEN, ArrayValue, Builder, Scalar, StaticValue, Value
 
 if TYPE_CHECKING:
     from robot_dyn.codegen.loops.function import Function
@@ -65,7 +65,7 @@ def subtract_product(x: Array, y: Array, z: Array) -> None:
     x -= y * z
 
 
-def divide(x: Array, s: Any) -> None:
+def divide(x: Array, s: float | Array) -> None:
     """Set x ← x / s, for a number or entry by entry."""
     x /= s
 
@@ -94,7 +94,7 @@ def evaluation(f: Function, node: ast.AST, function: Scalar, t: Scalar, *arrays_
 
 @emits
 def _require(f: Function, node: ast.AST, holds: Scalar, message: StaticValue) -> Value:
-    f.check(truth(f, holds), node, message.value)
+    f.check(truth(f, holds), node, str(message.value))
     return NOTHING
 
 
@@ -105,7 +105,14 @@ def _part(f: Function, node: ast.AST, x: ArrayValue, first: Scalar, count: Scala
 
 @emits
 def _weighted_sum(
-    f: Function, node: ast.AST, x: ArrayValue, y: ArrayValue, h: Value, weights: ArrayValue, K: ArrayValue, count: Any
+    f: Function,
+    node: ast.AST,
+    x: ArrayValue,
+    y: ArrayValue,
+    h: Value,
+    weights: ArrayValue,
+    K: ArrayValue,
+    count: Scalar,
 ) -> Value:
     if not all(array.kind.contiguous for array in (x, y, weights, K)):
         raise f.refused(node, "a combination of arrays that are not contiguous", "copy them first")
@@ -142,7 +149,7 @@ def _weighted_sum(
     return NOTHING
 
 
-def _in_place(rule: Callable[..., Any]) -> Callable[..., Value]:
+def _in_place(rule: vectors.Rule) -> Callable[..., Value]:
     """Return a handler of x ← rule(x, …), entry by entry."""
 
     @emits
@@ -187,9 +194,9 @@ def multiplication(f: Function, node: ast.AST, x: ArrayValue, y: Value, out: Arr
 def _sum_sizes(f: Function, node: ast.AST, x: ArrayValue, out: ArrayValue) -> Value:
     if not (x.kind.contiguous and out.kind.contiguous):
         raise f.refused(node, "a sum over arrays that are not contiguous", "copy them first")
-    if f.silent:
-        return NOTHING
     b, (rows, W) = f.builder, x.shape
+    if not isinstance(b, ir.IRBuilder):
+        return NOTHING
     for width, e in vectors.chunks(f, W, vectors.WIDTHS):
         lanes = Vectors(b, F64, width)
         with b.goto_entry_block():
@@ -207,7 +214,7 @@ def limitation(f: Function, node: ast.AST, x: ArrayValue, limit: Value) -> Value
     """Return True if all entries of an array are less than a limit."""
     vectors.check(f, node, x, [])
     if f.silent:
-        return Scalar(BOOL, None)
+        return Scalar(BOOL, UNWRITTEN)
     b, entry_kind = f.builder, x.kind.of
     most, less = (
         converted(f, scalar(f, limit, node), entry_kind, node),
@@ -226,19 +233,19 @@ def limitation(f: Function, node: ast.AST, x: ArrayValue, limit: Value) -> Value
 class _AnyLane:
     """Flag that is set if any mask of a loop, of at most 8 lanes, is true in any lane."""
 
-    def __init__(self, b: Any) -> None:
+    def __init__(self, b: Builder) -> None:
         self._builder = b
         with b.goto_entry_block():
             self._bits = b.alloca(I8)
         b.store(ir.Constant(I8, 0), self._bits)
 
-    def add(self, mask: Any, width: int) -> None:
+    def add(self, mask: ir.Value, width: int) -> None:
         """Include another mask."""
         b, bits = self._builder, self._builder.bitcast(mask, ir.IntType(width))
         b.store(b.or_(b.load(self._bits), bits if width == 8 else b.zext(bits, I8)), self._bits)
 
     @property
-    def value(self) -> Any:
+    def value(self) -> ir.Value:
         """Result after the loop."""
         return self._builder.icmp_unsigned("!=", self._builder.load(self._bits), ir.Constant(I8, 0))
 
@@ -251,7 +258,7 @@ def enclosure(
     for bound in (low, high):
         vectors.check(f, node, bound, [x])
     if f.silent:
-        return Scalar(BOOL, None)
+        return Scalar(BOOL, UNWRITTEN)
     b, (least, most) = f.builder, (real(f, bound, node) for bound in (least, most))
     outside_any = _AnyLane(b)
     for width, e in vectors.chunks(f, arrays.size(f, x), vectors.WIDTHS):
@@ -266,7 +273,7 @@ def enclosure(
 
 
 subtraction = _in_place(lambda b, x, y: b.fsub(x, y))
-OPERATIONS: Mapping[Any, Callable[..., Value]] = MappingProxyType(
+OPERATIONS: Mapping[Callable[..., object], Callable[..., Value]] = MappingProxyType(
     {
         require: _require, part: _part, weighted_sum: _weighted_sum, np.multiply: multiplication,
         subtract_multiple: _in_place(lambda b, x, y, s: b.fsub(x, b.fmul(y, s))),

@@ -23,13 +23,29 @@ from robot_dyn.foundations.validate import choice, instance, truth
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.right_angles import RightAngle, completed
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Dynamics
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Dynamics, NanRows
 
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
 
+class _Derivatives(Dynamics[np.ndarray]):
+    """Queries with the derivatives of forward dynamics."""
+
+    def forward_dynamics_derivatives(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return ∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
+        three = self._answer(_DERIVATIVES, (q, v, tau), None)
+        return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
+
+
 @dataclass(frozen=True)
-class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
+class CompiledNanRows(_Derivatives, NanRows[np.ndarray]):
+    """The queries of a compiled robot, with NaN for states without a result; see `Dynamics.nan_rows`."""
+
+
+@dataclass(frozen=True)
+class CompiledDynamics(_Derivatives, Parametrised):
     """A robot as machine code; each quantity is compiled on first use and checked against Pinocchio.
 
     Attributes:
@@ -109,6 +125,10 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
         """Names of the n joints, in the order of q."""
         return self.original.joint_names
 
+    @property
+    def nan_rows(self) -> CompiledNanRows:
+        return CompiledNanRows(self)
+
     @cached_property
     def _vector(self) -> tuple[int, Any]:
         """Arguments of `empty` for a result (n,)."""
@@ -127,39 +147,34 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
     def inertial_parameters(self) -> np.ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
         return self.robot.inertial_parameters
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Any:
         if frame:
-            return self.robot._answer(name, state, out, errors, frame)
+            return self.robot._answer(name, state, out, frame, nan=nan)
         if shape := self._shapes[name]:
             y = empty(shape, self._vector[1]) if out is None else out
             if not self._ones[name](*state, y):
                 return y
-        return self.engine.ask(name, state, out, errors, self._otherwise(name))
+        return self.engine.ask(name, state, out, nan, self._otherwise(name))
 
     # --- queries that take half a microsecond and skip `_answer`
 
     def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: np.ndarray | None = None, errors: str = "raise"
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: np.ndarray | None = None
     ) -> np.ndarray:
         y = empty(*self._vector) if out is None else out
         if not self._ones["inverse_dynamics"](q, v, a, y):
             return y
-        return self._answer("inverse_dynamics", (q, v, a), out, errors)
+        return self._answer("inverse_dynamics", (q, v, a), out)
 
     def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: np.ndarray | None = None, errors: str = "raise"
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: np.ndarray | None = None
     ) -> np.ndarray:
         y = empty(*self._vector) if out is None else out
         if not self._ones["forward_dynamics"](q, v, tau, y):
             return y
-        return self._answer("forward_dynamics", (q, v, tau), out, errors)
-
-    def forward_dynamics_derivatives(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, errors: str = "raise"
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return ∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
-        three = self._answer(_DERIVATIVES, (q, v, tau), None, errors)
-        return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
+        return self._answer("forward_dynamics", (q, v, tau), out)
 
     def _otherwise(self, quantity: str) -> Callable[..., Any]:
         """Return Pinocchio's method for a quantity."""

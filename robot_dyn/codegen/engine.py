@@ -123,10 +123,12 @@ class Engine:
         quantity: str,
         arguments: tuple[Any, ...],
         out: np.ndarray | None,
-        errors: str,
+        nan: bool,
         otherwise: Callable[..., Any],
     ) -> Any:
         """Evaluate a quantity in general: check arguments, process batches, leave doubtful states to `otherwise`.
+
+        With `nan`, states without a result become NaN.
 
         Raises:
             QueryError: If an argument is wrong. Errors of `otherwise` are passed on. In both cases `out` is unchanged.
@@ -151,7 +153,7 @@ class Engine:
             state = (float(values[0][0]), *values[1:]) if timed else values
             return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
-        answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
+        answer = answered(equation, arrays, shape, self.joint_names, nan, Float(np.dtype(self.dtype)))
         return into(out, answer if requested.axes else answer[..., 0][()])
 
     def _computed(self, quantity: str, arguments: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from robot_dyn.codegen.program import Program
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
 from robot_dyn.codegen.threads import shared
+
+if TYPE_CHECKING:
+    from llvmlite import ir
 
 # Vector instructions that a thread executes per piece, about 50 µs; below _PIECES of these, waking a second thread
 # takes as long as it saves.
@@ -113,19 +116,19 @@ class Kernel:
         return machine_code.assembly(self._write_batch, "batch")
 
     @property
-    def _kind(self) -> Any:
+    def _kind(self) -> ir.Type:
         return F32 if self.dtype == "float32" else F64
 
     @property
     def _limits(self) -> Limits:
         return Limits(_LARGEST[self.dtype], self.doubtful)
 
-    def _write_state(self, module: Any, name: str, any_angle: bool = False) -> None:
+    def _write_state(self, module: ir.Module, name: str, any_angle: bool = False) -> None:
         settings = self.program, self._kind, self._limits, any_angle, self._parametrised
         state = state_function(module, f"{name}state", *settings)
         write_state_entry(module, f"{name}call", state, self._of_states, self.shape, self.times, self._parametrised)
 
-    def _write_batch(self, module: Any, name: str) -> None:
+    def _write_batch(self, module: ir.Module, name: str) -> None:
         settings = self.program, self._kind, self._limits, self._parametrised
         batch = batch_function(module, f"{name}batch", *settings)
         outputs = len(self.program.outputs)
@@ -140,10 +143,10 @@ class Kernel:
         """Lengths of the inputs that vary between states."""
         return self.program.inputs[: len(self.program.inputs) - self._parametrised]
 
-    def _function(self, form: str, write: Callable[[Any, str], None]) -> Callable[..., int]:
+    def _function(self, form: str, write: machine_code.Write) -> Callable[..., int]:
         return python_function(self._address("call", form, write), np.array(self.parameters, self.dtype).tobytes())
 
-    def _address(self, function: str, form: str, write: Callable[[Any, str], None]) -> int:
+    def _address(self, function: str, form: str, write: machine_code.Write) -> int:
         settings = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
         key = digest([form, sources_of_the_writer(), str(self.program), *settings])
         return machine_code.addresses((function,), key, write, self.store, f"{self.about}, {form}")[0]

@@ -6,14 +6,14 @@ plants that differ only in these share compiled code.
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, overload
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.codegen.engine import Engine
@@ -27,8 +27,9 @@ from robot_dyn.codegen.trace.trace import Traced
 from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import MissingTimeError
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import PLANT
+from robot_dyn.queries.dynamics import PLANT, Dynamics
 
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
 
@@ -40,13 +41,22 @@ class CompiledPlant:
     Attributes:
         plant: Plant passed by the user.
         dynamics: Compiled rigid-body dynamics of the plant.
+        is_nan_allowed: True for NaN at states without a result, see `nan_rows`.
     """
 
     plant: Plant
     dynamics: CompiledDynamics
+    is_nan_allowed: bool = False
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return CompiledPlant, (self.plant, self.dynamics)
+        return CompiledPlant, (self.plant, self.dynamics, self.is_nan_allowed)
+
+    @cached_property
+    def nan_rows(self) -> CompiledPlant:
+        """The same queries, with NaN instead of an error for each state without a result; see `Dynamics.nan_rows`."""
+        other = replace(self, is_nan_allowed=True)
+        vars(other)["engine"] = self.engine  # to share the kernels
+        return other
 
     @cached_property
     def interpreted(self) -> Plant:
@@ -60,9 +70,11 @@ class CompiledPlant:
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
             rows = [[state[name][i] for name in PLANT[quantity].arguments] for i in range(len(state["t"]))]
             times = zip(state["t"], state["q"], state["v"], strict=True)
-            effects = np.array([np.broadcast_to(self.interpreted.torque(*x), state["q"].shape[1:]) for x in times])
+            effects = np.array(
+                [np.broadcast_to(self.interpreted.torque(q, v, t=t), state["q"].shape[1:]) for t, q, v in times]
+            )
             method = getattr(self.interpreted, quantity)
-            return np.array([np.broadcast_to(method(*row), state["q"].shape[1:]) for row in rows]), effects
+            return np.array([np.broadcast_to(method(*row, t=t), state["q"].shape[1:]) for t, *row in rows]), effects
 
         return Engine(
             self._traced,
@@ -102,40 +114,83 @@ class CompiledPlant:
         """Names of the n joints, in the order of q."""
         return self.dynamics.joint_names
 
-    def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Return the mass matrix, (..., n, n)."""
-        return self.dynamics.M(q, out=out, errors=errors)
+    def M(self, q: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+        """Return the mass matrix, (..., n, n); it does not depend on t."""
+        return self._rigid.M(q, out=out)
 
-    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Return the Coriolis matrix, (..., n, n)."""
-        return self.dynamics.C(q, v, out=out, errors=errors)
+    def C(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+        """Return the Coriolis matrix, (..., n, n); it does not depend on t."""
+        return self._rigid.C(q, v, out=out)
 
-    def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Return the forces that actuation must overcome, N = ∂V/∂q − Σ τ_effect, (..., n)."""
-        return self._ask("N", (t, q, v), out, errors)
+    def N(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+        """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N].
 
-    def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Return Σ τ_effect, (..., n)."""
-        return self._ask("torque", (t, q, v), out, errors)
+        Args:
+            q: Position, (..., n).
+            v: Velocity, (..., n).
+            t: Times in [s], one or with the shape of a batch; required if an effect depends on the time.
+            out: Array that receives the result and is returned.
+
+        Raises:
+            QueryError: If an argument is wrong; MissingTimeError if t is missing.
+        """
+        return self._ask("N", (self._any_time if t is None else t, q, v), out)
+
+    def torque(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+        """Return Σ τ_effect, (..., n); for arguments and errors, see `N`."""
+        return self._ask("torque", (self._any_time if t is None else t, q, v), out)
 
     def inverse_dynamics(
-        self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        *,
+        t: ArrayLike | None = None,
+        out: np.ndarray | None = None,
     ) -> Any:
         """Return the actuation τ = M a + C v + N for the acceleration a, (..., n)."""
-        return self._ask("inverse_dynamics", (t, q, v, a), out, errors)
+        return self._ask("inverse_dynamics", (self._any_time if t is None else t, q, v, a), out)
 
     def forward_dynamics(
-        self, t: Any, q: Array, v: Array, u: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+        self,
+        q: Array,
+        v: Array,
+        u: Array,
+        *,
+        t: ArrayLike | None = None,
+        out: np.ndarray | None = None,
     ) -> Any:
         """Return the acceleration under the actuation u, (..., n)."""
-        return self._ask("forward_dynamics", (t, q, v, u), out, errors)
+        return self._ask("forward_dynamics", (self._any_time if t is None else t, q, v, u), out)
 
-    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
         if arguments[0].__class__ in _TIMES:
             y = np.empty(self.n, self.dynamics.dtype) if out is None else out
             if not self.engine.ones[quantity](*arguments, y):
                 return y
-        return self.engine.ask(quantity, arguments, out, errors, getattr(self.interpreted, quantity))
+
+        def otherwise(t: float, *state: Any) -> Any:
+            return getattr(self.interpreted, quantity)(*state, t=t)
+
+        return self.engine.ask(quantity, arguments, out, self.is_nan_allowed, otherwise)
+
+    @cached_property
+    def _rigid(self) -> Dynamics[np.ndarray]:
+        """Rigid bodies; raises a TraceError if a payload comes or goes."""
+        _ = self._symbolic
+        return self.dynamics.nan_rows if self.is_nan_allowed else self.dynamics
+
+    @cached_property
+    def _any_time(self) -> float:
+        """A time for queries without t; raises a MissingTimeError if an effect depends on the time."""
+        (t, ts), (_, qs), (_, vs), _ = self._inputs
+        with Symbolic().scope():
+            torques = self._symbolic.equation_of_motion.torques(ts[0], qs, vs)
+        for force, torque in zip(self.plant.forces, torques, strict=True):
+            if ca.depends_on(ca.densify(column(torque)), t):
+                raise MissingTimeError(f"{force.name} depends on the time: pass t=, in [s]")
+        return 0.0
 
     # --- the trace
 
@@ -188,7 +243,15 @@ class CompiledPlant:
         return Traced(function, formulation, {formulation: instructions(function)})
 
 
-class Compiled(ABC):  # noqa: B024  its instances belong to the two classes registered below
+@overload
+def compiled(
+    robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledDynamics: ...
+@overload
+def compiled(
+    robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledPlant: ...
+def compiled(robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True) -> Any:
     """Compile a robot or a plant to machine code, for one state (n,) and batches (..., n).
 
     Args:
@@ -198,28 +261,12 @@ class Compiled(ABC):  # noqa: B024  its instances belong to the two classes regi
         cache: Store compiled code on disk.
 
     Returns:
-        A `CompiledDynamics` or a `CompiledPlant`; both are instances of `Compiled`.
+        An object with the same queries: a `CompiledDynamics` for a robot, a `CompiledPlant` for a plant.
 
     Raises:
         QueryError: If `robot_or_plant` is neither, or an option is not allowed.
     """
-
-    @overload
-    def __new__(
-        cls, robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
-    ) -> CompiledDynamics: ...
-    @overload
-    def __new__(
-        cls, robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
-    ) -> CompiledPlant: ...
-    def __new__(
-        cls, robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
-    ) -> Any:
-        if not isinstance(robot_or_plant, Plant):
-            return CompiledDynamics(robot_or_plant, dtype, threads, cache)
-        robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
-        return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))
-
-
-Compiled.register(CompiledDynamics)
-Compiled.register(CompiledPlant)
+    if not isinstance(robot_or_plant, Plant):
+        return CompiledDynamics(robot_or_plant, dtype, threads, cache)
+    robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
+    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))

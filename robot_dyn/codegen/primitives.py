@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from robot_dyn.foundations.arithmetic import Array
 
 
-def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int) -> None:
+def combination(x: Array, y: Array, h: float, weights: Array, K: Array, count: int) -> None:
     """Same as `integrate.primitives.combination`."""
     require(
         count <= len(weights) and count <= len(K) and len(x) == len(y) and len(y) <= K.shape[1]
@@ -202,7 +202,7 @@ def take_off(x: Array, column: Array, k: int, low: int, high: int) -> None:
 
 larger.inlined = True  # pyright: ignore
 
-INSTEAD: Mapping[Any, Callable[..., Any]] = MappingProxyType(
+INSTEAD: Mapping[Callable[..., object], Callable[..., object]] = MappingProxyType(
     {
         **OPERATIONS, primitives.evaluate: evaluation, primitives.copy: copying, primitives.subtract: subtraction,
         primitives.combination: combination, primitives.sizes: sizes, primitives.norm: norm,

@@ -112,9 +112,9 @@ def by_cause(
         tau: Actuation, (k, n).
         exerted: Torque of each effect on the joints, (k, n), by name; see `exerted_torques`.
     """
-    N = dynamics.N(q, errors="nan")
+    N = dynamics.nan_rows.N(q)
     # M a comes from the recursion, not from the matrix: O(n) time, and no n × n matrices to store
-    of_bodies = (dynamics.inverse_dynamics(q, 0 * v, a, errors="nan") - N, dynamics.coriolis_torque(q, v, errors="nan"))
+    of_bodies = (dynamics.nan_rows.inverse_dynamics(q, 0 * v, a) - N, dynamics.nan_rows.coriolis_torque(q, v))
     torques = dict(zip(OF_BODIES, (*of_bodies, N), strict=True)) | {name: 0.0 - x for name, x in exerted.items()}
     kinds = joint_types_of(dynamics)
     return Causes(dynamics.joint_names, kinds, t, tau, torques)
@@ -173,7 +173,7 @@ def _torques(
 
 
 def _inverse_dynamics(dynamics: Dynamics, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-    return dynamics.inverse_dynamics(q, v, a, errors="nan")
+    return dynamics.nan_rows.inverse_dynamics(q, v, a)
 
 
 def _complete(

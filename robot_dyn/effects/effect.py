@@ -87,7 +87,7 @@ class Effect(Value):
 
         Integration steps end where a threshold is passed; `on_side` returns the effect on either side. A class that
         does not define this method makes no claim: it runs interpreted unless machine code is requested, and error
-        estimates do not rely on the order of the integrator. Thresholds on the actuation are for bounds and apply to
+        estimates do not rely on the order of the method. Thresholds on the actuation are for bounds and apply to
         the actuation that reaches the bound.
         """
         return ()

@@ -16,10 +16,11 @@ from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.explanation import explanation
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.hold import Hold, held
+from robot_dyn.effects.missing_time import MISSING_TIME
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.foundations.errors import EffectError, OverflowedError, QueryError, shown
+from robot_dyn.foundations.errors import EffectError, MissingTimeError, OverflowedError, QueryError, shown
 from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
 from robot_dyn.foundations.values import Caching, several
 from robot_dyn.queries.dynamics import Dynamics
@@ -84,23 +85,21 @@ class Plant(Caching):
         """The payloads that come and go; within a phase of a run, payloads are fixed as carried or not."""
         return tuple(x for x in self.effects if isinstance(x, CarriedPayload) and x.carried is None)
 
-    def at(self, t: float) -> Plant:
+    def at(self, t: float | None) -> Plant:
         """Return the plant with the payloads carried at time t, in [s], as fixed bodies; itself without payloads.
 
         Raises:
-            QueryError: If t is not a finite number.
+            QueryError: If t is not a finite number; MissingTimeError if it is None and a payload comes or goes.
         """
-        t, payloads = number("t", t), self._timed_payloads
+        payloads, time = self._timed_payloads, None if t is None else number("t", t)
         if not payloads:
             return self
-        carried = [effect.payload for effect in payloads if effect.acts(t)]
+        if time is None:
+            raise MissingTimeError(f"{payloads[0].name} depends on the time: pass t=, in [s]")
+        carried = [effect.payload for effect in payloads if effect.acts(time)]
         robot: Any = self.dynamics
         others = [effect for effect in self.effects if effect not in payloads]
         return Plant(robot.with_(payload=carried), others)
-
-    def _require_fixed_payloads(self, query: str) -> None:
-        if self._timed_payloads:
-            raise EffectError(f"{query} depends on the carried payloads, and so on the time: use plant.at(t), t in [s]")
 
     @property
     def forces(self) -> tuple[Force, ...]:
@@ -112,50 +111,54 @@ class Plant(Caching):
         (u,) = (u,) if self._is_plain(u) else self._states(u=u)
         return self.equation_of_motion.actuation(u)
 
-    def M(self, q: Array) -> Array:
-        """Return the mass matrix, (..., n, n); raise an EffectError if a payload comes or goes: call `at` first."""
-        self._require_fixed_payloads("M")
-        return self.dynamics.M(q)
+    def M(self, q: Array, *, t: float | None = None) -> Array:
+        """Return the mass matrix, (..., n, n), with the payloads carried at time t in [s]."""
+        return self.at(t).dynamics.M(q)
 
-    def C(self, q: Array, v: Array) -> Array:
-        """Return the Coriolis matrix, (..., n, n); raise an EffectError if a payload comes or goes: call `at` first."""
-        self._require_fixed_payloads("C")
-        return self.dynamics.C(q, v)
+    def C(self, q: Array, v: Array, *, t: float | None = None) -> Array:
+        """Return the Coriolis matrix, (..., n, n), with the payloads carried at time t in [s]."""
+        return self.at(t).dynamics.C(q, v)
 
-    def N(self, t: float, q: Array, v: Array) -> Array:
-        """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N]."""
-        return self._finite(self.at(t).dynamics.N(q) - self.torque(t, q, v))
+    def N(self, q: Array, v: Array, *, t: float | None = None) -> Array:
+        """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N].
 
-    def torque(self, t: float, q: Array, v: Array) -> Array:
+        For arguments and errors, see `torque`.
+        """
+        return self._finite(self.at(t).dynamics.N(q) - self.torque(q, v, t=t))
+
+    def torque(self, q: Array, v: Array, *, t: float | None = None) -> Array:
         """Return the torque of all effects on the joints, Σ τ_effect, (..., n); 0 without effects.
 
         Args:
-            t: Time, one number, in [s].
             q: Position, (..., n).
             v: Velocity, (..., n).
+            t: Time, one number, in [s]; required if an effect depends on the time.
 
         Raises:
-            QueryError: If an argument has another shape or is not finite; OverflowedError if the result is not.
+            QueryError: If an argument has another shape or is not finite; OverflowedError if the result is not;
+                MissingTimeError if t is missing.
             EffectError: If an effect does not fit the joints.
         """
-        if t.__class__ is float and isfinite(t) and self._is_plain(q) and self._is_plain(v):
-            total = sum(self.equation_of_motion.torques(t, q, v, v.shape), start=np.zeros(v.shape))
+        is_time = t is None or (t.__class__ is float and isfinite(t))
+        time: Any = MISSING_TIME if t is None else t
+        if is_time and self._is_plain(q) and self._is_plain(v):
+            total = sum(self.equation_of_motion.torques(time, q, v, v.shape), start=np.zeros(v.shape))
             if is_moderate(total):
                 return total
-        t, (q, v) = number("t", t), self._states(q=q, v=v)
+        time, (q, v) = time if is_time else number("t", t), self._states(q=q, v=v)
         zeros = np.zeros((*check_batches(q=q, v=v), self.dynamics.n))
         with self._arithmetic.scope(), np.errstate(all="ignore"):  # overflow is reported as an error
             zeros = zeros if q.dtype != object else self._arithmetic.array(zeros)
-            return self._finite(sum(self.equation_of_motion.torques(t, q, v, zeros.shape), start=zeros))
+            return self._finite(sum(self.equation_of_motion.torques(time, q, v, zeros.shape), start=zeros))
 
-    def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
+    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, t: float | None = None) -> Array:
         """Return the actuation that causes the acceleration a, τ = M a + C v + N, (..., n)."""
-        return self._finite(self.at(t).dynamics.inverse_dynamics(q, v, a) - self.torque(t, q, v))
+        return self._finite(self.at(t).dynamics.inverse_dynamics(q, v, a) - self.torque(q, v, t=t))
 
-    def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
+    def forward_dynamics(self, q: Array, v: Array, u: Array, *, t: float | None = None) -> Array:
         """Return the acceleration under the actuation u, (..., n)."""
         equation = self.at(t).equation_of_motion
-        total = equation.on_joints(self.actuation(u)) + self.torque(t, q, v)
+        total = equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t)
         if not equation.set_valued:
             return equation.acceleration(q, v, total)
         q, v = self._states(q=q, v=v)
@@ -163,14 +166,14 @@ class Plant(Caching):
         rows = zip(*(np.broadcast_to(x, (*batch, n)).reshape(-1, n) for x in (q, v, total)), strict=True)
         return np.array([equation.acceleration(*row) for row in rows]).reshape(*batch, n)
 
-    def held(self, t: float, q: Array, v: Array, u: Array) -> tuple[Hold, ...]:
+    def held(self, q: Array, v: Array, u: Array, *, t: float | None = None) -> tuple[Hold, ...]:
         """Return the joints that dry friction and rigid stops hold in one state, with load and break-away loads.
 
         Args:
-            t: Time, in [s].
             q: Position, (n,).
             v: Velocity, (n,).
             u: Actuation, (n,).
+            t: Time, in [s]; required if an effect depends on the time.
 
         Raises:
             QueryError: If an argument has another shape or is not finite.
@@ -180,7 +183,7 @@ class Plant(Caching):
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
             raise QueryError(f"held takes one state: q, v and u must have shape ({self.dynamics.n},)")
         equation = self.at(t).equation_of_motion
-        return held(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(t, q, v))
+        return held(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t))
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:

@@ -10,6 +10,7 @@ import numpy as np
 
 from robot_dyn.effects.effect import numbered
 from robot_dyn.effects.hold import Hold
+from robot_dyn.effects.missing_time import MISSING_TIME
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import QueryError
@@ -18,7 +19,6 @@ from robot_dyn.foundations.validate import instance, number, one_state
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.info import no_torque
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import PLANT, C, M
 from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
 
 
@@ -93,7 +93,7 @@ class PlantState(Answer, Value):
             )
 
 
-def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: float = 0.0) -> PlantState:
+def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: float | None = None) -> PlantState:
     """Evaluate a plant, or a robot, at a state: tau from a, or a and the joints held at rest from tau.
 
     Raises:
@@ -101,7 +101,7 @@ def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: f
             does not have shape (n,) or is not finite.
     """
     plant = plant if isinstance(plant, Plant) else Plant(plant)
-    plant = plant.at(t := number("t", t))
+    plant, t = plant.at(t), None if t is None else number("t", t)
     robot = instance("plant", plant.dynamics, Robot, "give the plant of a robot, such as rd.Plant(rd.load('ur5'))")
     if (a is None) == (tau is None):
         raise QueryError("give one of a and tau: the other follows from it")
@@ -110,13 +110,13 @@ def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: f
     of_tau = tau is not None
     if of_tau:
         tau = plant.actuation(one_state("tau", tau, robot.joint_names))
-        a, held = plant.forward_dynamics(t, q, v, tau), plant.held(t, q, v, tau)
+        a, held = plant.forward_dynamics(q, v, tau, t=t), plant.held(q, v, tau, t=t)
     else:
         a = one_state("a", a, robot.joint_names)
-        tau = plant.inverse_dynamics(t, q, v, a)
-    torques = plant.equation_of_motion.torques(t, q, v, q.shape)
+        tau = plant.inverse_dynamics(q, v, a, t=t)
+    torques = plant.equation_of_motion.torques(MISSING_TIME if t is None else t, q, v, q.shape)
     state = {"q": q, "v": v, "a": a, "tau": tau}
-    terms = {query.name: query.ask(plant, state | {"t": t}) for query in (M, C, PLANT["N"])}
+    terms = {"M": plant.M(q, t=t), "C": plant.C(q, v, t=t), "N": plant.N(q, v, t=t)}
     effects = dict(zip(numbered(*(force.name for force in plant.forces)), torques, strict=True))
     return PlantState(
         robot.name, robot.edits.gravity, robot.gravity_acts, robot.joint_names, robot.joint_types, **state, **terms,

@@ -27,8 +27,8 @@ class RigidStops(SetValued):
     have any size, directed away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 
     Attributes:
-        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" to read it from the
-            robot's file.
+        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" for the limits of
+            the robot's file, "urdf_soft" for its soft limits.
         upper: Position of the upper stop, inf for none, above the lower one.
         restitution: e, a scalar or (n,), 0 to 1; 0 by default.
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, final
 
-from robot_dyn.effects.effect import Conservative
+import numpy as np
+
+from robot_dyn.effects.effect import Conservative, Effect
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import URDF, coefficient
+from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -19,17 +22,26 @@ class Spring(Conservative):
 
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
-        rest: q₀, a scalar or (n,), in [rad] or [m].
+        rest: q₀, a scalar or (n,), in [rad] or [m]. With stiffness="urdf" on an arm whose file states rest positions,
+            "urdf" or an array.
 
     Example:
         >>> rd.effects.Spring(stiffness=2.0, rest=[0.1, -0.2])
     """
 
-    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
-    rest: Any = field(default=0.0, metadata=coefficient("rad", symbol="q₀"))
+    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0, stated="stated_stiffness"))
+    rest: Any = field(default=0.0, metadata=coefficient("rad", symbol="q₀", stated="stated_rest"))
 
     term = "−k (q − q₀)"
     thresholds = smooth
+
+    def on(self, dynamics: Dynamics) -> Effect:
+        rest = getattr(dynamics, "stated_rest", np.zeros(1))
+        if self.stiffness is URDF and np.shape(self.rest) == () and self.rest is not URDF and rest.any():
+            raise EffectError(
+                f"{self.name}: the file states rest positions of these springs; give rest='urdf', or an array"
+            )
+        return super().on(dynamics)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.stiffness * (q - self.rest)

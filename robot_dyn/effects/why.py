@@ -85,7 +85,14 @@ class Why(Answer):
 
 
 def why(
-    plant: Plant | Dynamics, q: Any, v: Any, a: Any | None, joint: str, *, tau: Any | None = None, t: float = 0.0
+    plant: Plant | Dynamics,
+    q: Any,
+    v: Any,
+    a: Any | None,
+    joint: str,
+    *,
+    tau: Any | None = None,
+    t: float | None = None,
 ) -> Why:
     """Split the torque of a joint by link and cause.
 
@@ -101,7 +108,7 @@ def why(
         a: Accelerations, (n,), in [rad/s²] or [m/s²]; None if tau is passed.
         joint: Name of the joint.
         tau: Actuation, (n,), in [N m] or [N]; determines a and the torque that dry friction and stops balance.
-        t: Time, in [s], for effects that come and go.
+        t: Time, in [s]; required if an effect depends on the time.
 
     Raises:
         QueryError: If the joint is unknown, the dynamics of the plant is not a robot, not exactly one of a and tau is

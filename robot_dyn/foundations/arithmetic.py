@@ -13,15 +13,23 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import wraps
 from threading import RLock
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, SupportsFloat, TypeVar, final
 
 import numpy as np
 
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import integer, real
 
-Array = np.ndarray  # of floats, or of flint.arb objects: NumPy's types do not tell them apart
+if TYPE_CHECKING:
+    from flint import arb
+    from numpy.typing import DTypeLike
+
+Array = np.ndarray  # of floats, or of flint.arb objects: NumPy has one type for both
+Numeral = str | SupportsFloat  # a number in the text of a file, or a number
 Scalar = float | np.ndarray  # one number, or one for each state of a batch
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+Owner = TypeVar("Owner")
 
 
 class Arithmetic(ABC):
@@ -34,22 +42,25 @@ class Arithmetic(ABC):
     dtype: np.dtype
 
     @abstractmethod
-    def number(self, literal: Any) -> Any:
-        """Return one number from the text of a file, or from a number, which is converted exactly if possible."""
+    def number(self, literal: Numeral) -> Any:
+        """Return one number from the text of a file, or from a number, which is converted exactly if possible.
+
+        Its type is the type of the entries of arrays: no type has the operators of floats, balls and symbols.
+        """
 
     @abstractmethod
     def scope(self) -> AbstractContextManager[None]:
         """Return the context in which operations have the precision of this arithmetic."""
 
     @abstractmethod
-    def asarray(self, values: Any) -> Array:
+    def asarray(self, values: object) -> Array:
         """Return an array of this kind of number, not copied if it is one; raise TypeError or ValueError if invalid."""
 
     @abstractmethod
     def finite(self, x: Array) -> np.ndarray:
         """Return True for entries that are finite numbers."""
 
-    def array(self, literals: Any) -> Array:
+    def array(self, literals: object) -> Array:
         """Return an array of numbers with the shape of the nested literals."""
         source = np.asarray(literals, dtype=object)
         result = np.empty(source.size, dtype=self.dtype)
@@ -64,13 +75,13 @@ class Float(Arithmetic):
 
     dtype: np.dtype
 
-    def number(self, literal: Any) -> Any:
+    def number(self, literal: Numeral) -> np.floating:
         return self.dtype.type(literal)
 
     def scope(self) -> AbstractContextManager[None]:
         return nullcontext()
 
-    def asarray(self, values: Any) -> Array:
+    def asarray(self, values: object) -> Array:
         array = real(values)
         with np.errstate(over="ignore"):  # a longdouble that is too large becomes infinite
             return array.astype(self.dtype, copy=False)
@@ -102,10 +113,10 @@ class Ball(Arithmetic):
     def __post_init__(self) -> None:
         object.__setattr__(self, "bits", integer("bits of a Ball", self.bits, least=2, most=MOST_BITS))
 
-    def number(self, literal: Any) -> Any:
+    def number(self, literal: Numeral) -> arb:
         from flint import arb
 
-        if literal.__class__ is np.longdouble:
+        if type(literal) is np.longdouble:
             high = float(literal)  # two exact parts, each a float64
             return arb(high) + arb(float(literal - np.longdouble(high)))
         exact = (arb, str, int)
@@ -118,7 +129,7 @@ class Ball(Arithmetic):
         with _flint_turn, ctx.workprec(self.bits):
             yield
 
-    def asarray(self, values: Any) -> Array:
+    def asarray(self, values: object) -> Array:
         array = np.asarray(values, dtype=object) if not isinstance(values, np.ma.MaskedArray) else real(values)
         if any(isinstance(x, bool | np.bool_) for x in array.flat):
             raise ValueError("truth values")
@@ -128,7 +139,7 @@ class Ball(Arithmetic):
         return np.vectorize(lambda ball: ball.is_finite(), otypes=[bool])(x)
 
 
-def arithmetic_of(dtype: Any) -> Arithmetic:
+def arithmetic_of(dtype: DTypeLike | Arithmetic) -> Arithmetic:
     """Return the arithmetic for a float dtype of NumPy, or an `Arithmetic` such as `Ball(200)`.
 
     Raises:
@@ -145,11 +156,13 @@ def arithmetic_of(dtype: Any) -> Arithmetic:
     return Float(numpy_dtype)
 
 
-def in_arithmetic(method: Callable[..., Any]) -> Callable[..., Any]:
+def in_arithmetic(
+    method: Callable[Concatenate[Owner, Arguments], Result],
+) -> Callable[Concatenate[Owner, Arguments], Result]:
     """Wrap a method so that it runs in the precision of its object's `arithmetic`."""
 
     @wraps(method)
-    def scoped(self: Any, *args: Any, **options: Any) -> Any:
+    def scoped(self: Any, *args: Arguments.args, **options: Arguments.kwargs) -> Result:
         with self.arithmetic.scope():
             return method(self, *args, **options)
 
@@ -166,7 +179,7 @@ def radius(x: Array) -> Array:
     return _per_ball(x, lambda ball: float(ball.rad().upper()))
 
 
-def _per_ball(x: Any, function: Callable[[Any], float]) -> Array:
+def _per_ball(x: Array, function: Callable[[arb], float]) -> Array:
     from flint import arb
 
     balls = np.asarray(x, dtype=object)

@@ -13,16 +13,34 @@ from copy import copy
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
 from functools import cache, cached_property
 from inspect import getattr_static
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, final
 
 import numpy as np
 
 from robot_dyn.foundations.errors import EffectError, RobotDynError, nearest, shorten, shown
 from robot_dyn.foundations.validate import instance, number, numbers, truth
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+    from numpy.typing import ArrayLike
+
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
+URDF_SOFT = "urdf_soft"  # as the position of a stop: the soft limit in the robot's file
 _KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
+
+Owner = TypeVar("Owner")  # an effect, controller or reference
+Built = TypeVar("Built", bound="DataclassInstance")
+
+
+class Jointed(Protocol):
+    """An arm with named joints."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def joint_names(self) -> tuple[str, ...]: ...
 
 
 @final
@@ -69,7 +87,9 @@ class Coefficient:
         """True if the coefficient is one number for all joints, or one number for each joint."""
         return self.shapes == JOINTS
 
-    def checked(self, name: str, values: Any, *, error: type[RobotDynError], resolved: bool) -> Any:
+    def checked(
+        self, name: str, values: object, *, error: type[RobotDynError], resolved: bool
+    ) -> float | np.ndarray | Mapping[str, float] | str:
         """Return the checked numbers, as a frozen copy or as a float.
 
         If `resolved`, values by joint name and "urdf" are returned unchanged; `on` resolves them for an arm.
@@ -83,6 +103,8 @@ class Coefficient:
             return values
         if resolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
+        if resolved and self.stated in ("lower", "upper") and isinstance(values, str) and values == URDF_SOFT:
+            return URDF_SOFT
         if resolved and self.stated and isinstance(values, str):
             raise error(f'{name} must be real numbers or "{URDF}", got {shorten(values)!r}')
         array = numbers(
@@ -90,7 +112,7 @@ class Coefficient:
         )
         return float(array) if self.shapes == ((),) else array
 
-    def on(self, name: str, values: Any, dynamics: Any) -> Any:
+    def on(self, name: str, values: ArrayLike | Mapping[str, float], dynamics: Jointed) -> ArrayLike:
         """Return the numbers for the joints of an arm; values by joint name or "urdf" become (n,).
 
         Raises:
@@ -101,24 +123,25 @@ class Coefficient:
             for joint in values.keys() - set(names):
                 raise EffectError(f"{name}: no joint {joint!r}; {nearest(str(joint), names)}")
             return [values.get(joint, self.elsewhere) for joint in names]
-        if values is URDF:
-            return self._stated(name, dynamics)
+        if values is URDF or values is URDF_SOFT:
+            return self._stated(name, values, dynamics)
         if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):
-            count = f"{len(values)} joint{'s' if len(values) > 1 else ''}"
+            length = np.shape(values)[0]
+            count = f"{length} joint{'s' if length > 1 else ''}"
             raise EffectError(
                 f"{name} has values for {count}, but the arm has {len(names)}; give one number for all joints, or one"
                 " for each joint"
             )
         return values
 
-    def _stated(self, name: str, dynamics: Any) -> Any:
+    def _stated(self, name: str, values: str, dynamics: Jointed) -> np.ndarray:
         try:
-            stated = getattr(dynamics, self.stated)
+            stated = getattr(dynamics, f"soft_{self.stated}" if values is URDF_SOFT else self.stated)
         except AttributeError:
-            raise EffectError(f"{name}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
+            raise EffectError(f"{name}={values!r} needs a Robot, got {type(dynamics).__name__}") from None
         if np.all(stated == self.elsewhere):
             raise EffectError(
-                f"{name}='urdf' has no effect: the file of {dynamics.name} states no value for any joint; give"
+                f"{name}={values!r} has no effect: the file of {dynamics.name} states no value for any joint; give"
                 " numbers, or remove the effect"
             )
         return stated
@@ -148,7 +171,7 @@ def declared(kind: type) -> Mapping[str, Coefficient]:
 
 
 @cache
-def defaults(kind: type) -> Mapping[str, Any]:
+def defaults(kind: type) -> Mapping[str, object]:
     """Return the defaults of coefficients of a class, by name, if they have one."""
     names = declared(kind)
     return {x.name: x.default for x in _fields(kind) if x.name in names and x.default is not MISSING}
@@ -158,7 +181,7 @@ def _fields(kind: type) -> tuple[Field[Any], ...]:
     return fields(kind) if is_dataclass(kind) else ()
 
 
-def check_coefficients(part: Any, error: type[RobotDynError], *, resolved: bool = False) -> None:
+def check_coefficients(part: object, error: type[RobotDynError], *, resolved: bool = False) -> None:
     """Check and freeze the coefficients of a part under construction; see `Coefficient.checked`."""
     for name, declared_as in declared(type(part)).items():
         value = getattr(part, name)
@@ -167,7 +190,7 @@ def check_coefficients(part: Any, error: type[RobotDynError], *, resolved: bool 
         object.__setattr__(part, name, declared_as.checked(name, value, error=error, resolved=resolved))
 
 
-def with_values(part: Any, values: Mapping[str, Any]) -> Any:
+def with_values(part: Owner, values: Mapping[str, object]) -> Owner:
     """Return a copy of a part with other coefficients, unchecked: symbols, for example, would fail the checks.
 
     A name may be a path into a nested part, such as "controller.kp" or "position.0.resolution".
@@ -184,14 +207,14 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
     return changed
 
 
-def _without_caches(part: Any) -> Any:
-    """A copy of a part without its cached properties, which may depend on its coefficients."""
+def _without_caches(part: Owner) -> Owner:
+    """Return a copy of a part without its cached properties, which may depend on its coefficients."""
     changed, caches = object.__new__(type(part)), cached_properties(part)
     vars(changed).update({name: x for name, x in vars(part).items() if name not in caches})
     return changed
 
 
-def cached_properties(part: Any) -> tuple[str, ...]:
+def cached_properties(part: object) -> tuple[str, ...]:
     """Return the names of the cached properties of a part that have been evaluated."""
     kind = type(part)
     return tuple(name for name in getattr(part, "__dict__", ()) if _is_cached(kind, name))
@@ -202,22 +225,23 @@ def _is_cached(kind: type, name: str) -> bool:
     return isinstance(getattr_static(kind, name, None), cached_property)
 
 
-def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:
+def rebuilt(part: Built, values: Mapping[str, object]) -> Built:
     """Return a copy of a part with other coefficients, constructed again and thus checked."""
     inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
     return replace(part, **{name: value for name, value in values.items() if "." not in name}, **inside)
 
 
-def value_at(part: Any, path: str) -> Any:
-    """Return the attribute of a part at a path."""
+def value_at(part: object, path: str) -> ArrayLike | None:
+    """Return the coefficient of a part at a path; None if it is optional and has no value."""
+    value: Any = part
     for name in path.split("."):
-        part = part[int(name)] if isinstance(part, tuple) else getattr(part, name)
-    return part
+        value = value[int(name)] if isinstance(value, tuple) else getattr(value, name)
+    return value
 
 
-def _by_head(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _by_head(values: Mapping[str, object]) -> dict[str, dict[str, object]]:
     """Group values inside nested parts by the attribute of the part, then by the rest of the path."""
-    parts: dict[str, dict[str, Any]] = {}
+    parts: dict[str, dict[str, object]] = {}
     for name, value in values.items():
         head, _, rest = name.partition(".")
         if rest:
@@ -225,7 +249,7 @@ def _by_head(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return parts
 
 
-def _within(part: Any, values: dict[str, Any], change: Callable[[Any, Mapping[str, Any]], Any]) -> Any:
+def _within(part: Any, values: dict[str, object], change: Callable[[Any, Mapping[str, object]], Any]) -> Any:
     if not isinstance(part, tuple):
         return change(part, values)
     inside = _by_head(values)

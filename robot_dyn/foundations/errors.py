@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from traceback import walk_tb
-from typing import Any
+from typing import TypeVar
 from unicodedata import category
+
+Result = TypeVar("Result")
 
 
 def escaped(text: str) -> str:
@@ -22,12 +24,12 @@ def escaped(text: str) -> str:
 class PortableError(Exception):
     """An error that keeps its message and attributes through `pickle` and `copy`, and so between processes."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Rebuild the error from its message and attributes: `__init__` of a subclass may take other arguments."""
         return _rebuilt, (type(self), self.args), self.__dict__
 
 
-def _rebuilt(kind: type[PortableError], args: tuple[Any, ...]) -> PortableError:
+def _rebuilt(kind: type[PortableError], args: tuple[object, ...]) -> PortableError:
     return kind.__new__(kind, *args)  # __new__ sets args
 
 
@@ -94,6 +96,10 @@ class QueryError(RobotDynError):
 
 class NotFiniteError(QueryError):
     """An argument of a query with a value that is NaN or infinite."""
+
+
+class MissingTimeError(QueryError):
+    """A query without t of a plant with an effect that depends on the time."""
 
 
 class OverflowedError(QueryError):
@@ -193,17 +199,21 @@ def nearest(name: str, names: Iterable[str]) -> str:
 _NOT_USER_CODE = {"robot_dyn", "numpy", "scipy", "casadi", *sys.stdlib_module_names}
 
 
-def call(method: Callable[..., Any], *arguments: Any) -> Any:
+def call(method: Callable[..., Result], *arguments: object) -> Result:
     """Call a method of an effect or controller and return its result.
 
     An exception in its code gets a note with the name of the part; errors of the library already contain it.
     """
     try:
         return method(*arguments)
+    except MissingTimeError as error:
+        if (name := getattr(getattr(method, "__self__", None), "name", None)) is not None:
+            error.args = (f"{name} depends on the time: pass t=, in [s]",)
+        raise
     except RobotDynError:
         raise
     except Exception as error:
-        part: Any = getattr(method, "__self__", None)
+        part = getattr(method, "__self__", None)
         owner = "" if part is None else f" of {getattr(part, 'name', type(part).__name__)}"  # None: a plain function
         error.add_note(f"in {getattr(method, '__name__', 'a method')}{owner}")
         raise

@@ -298,7 +298,7 @@ def _refuse_irregular(path: Path, mode: int, error: type[RobotDynError], remedy:
         raise error(f"{path}: is {'a folder' if S_ISDIR(mode) else 'not a regular file'}; {remedy}")
 
 
-def file_path(value: Any, error: type[RobotDynError]) -> Path:
+def file_path(value: object, error: type[RobotDynError]) -> Path:
     """Return the path of a file or folder."""
     if not isinstance(value, str | os.PathLike):
         raise error(f"path must be the path of a file, got {shown(value)}")

@@ -11,10 +11,18 @@ from importlib import import_module
 TYPE_CHECKING = False  # same as in typing, which takes longer to import than this module
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
+    from importlib.abc import SourceLoader
+    from typing import Protocol
+
+    class Spec(Protocol):
+        """The `__spec__` of a package that is read from a source file."""
+
+        name: str
+        origin: str
+        loader: SourceLoader
 
 
-def public_names(spec: Any) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+def public_names(spec: Spec) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """Return `__getattr__`, `__dir__` and `__all__` of a package, so that importing it imports none of its modules.
 
     Args:
@@ -25,7 +33,7 @@ def public_names(spec: Any) -> tuple[Callable[[str], Any], Callable[[], list[str
     homes = _homes(stub)
     names = sorted(_homes(stub.partition("__all__")[0]))
 
-    def public(name: str) -> Any:
+    def public(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {spec.name!r} has no attribute {name!r}")
         home = homes[name]

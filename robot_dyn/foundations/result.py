@@ -7,9 +7,12 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 UNREPORTED: Mapping[str, bool] = {"reported": False}
 """Metadata of a field that plain data omit."""
@@ -19,7 +22,11 @@ class reported(property):  # noqa: N801 - used like `property`
     """A property that plain data include, like a field."""
 
 
-def plain(value: Any) -> Any:
+@overload
+def plain(value: DataclassInstance | Mapping[str, object]) -> dict[str, object]: ...
+@overload
+def plain(value: object) -> object: ...
+def plain(value: object) -> object:
     """Convert a value for JSON: non-finite numbers become None, complex numbers pairs.
 
     Args:
@@ -43,6 +50,6 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
-def json_text(value: Any) -> str:
+def json_text(value: object) -> str:
     """Return the plain data of a value as JSON."""
     return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -8,7 +8,6 @@ With c = 0 and l = u_max this is the bound itself; with l = inf, u is unchanged;
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ def saturated(u: Array, limit: Array, middle: Array | None) -> Array:
     return middle + np.minimum(np.maximum(u - middle, -limit), limit)
 
 
-def middle_of(limit: Any) -> float | None:
+def middle_of(limit: object) -> float | None:
     """Return the middle of a bound as stated: 0, or None if no limit can be reached, or limits are not resolved yet."""
     reachable = isinstance(limit, np.ndarray) and (np.isfinite(limit) & (limit > 0)).any()
     return 0.0 if reachable else None

@@ -14,12 +14,16 @@ from functools import cached_property
 from math import prod
 from os import SEEK_END
 from pathlib import Path
-from typing import Any, BinaryIO, Generic, TypeVar, final
+from typing import TYPE_CHECKING, Any, BinaryIO, Generic, TypeVar, final
 
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError, shorten
 from robot_dyn.foundations.files import FileKind, reading, save, target
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
 
 ABOUT = "about"
 _LONGEST = 10_000  # largest number of characters in a name
@@ -27,6 +31,7 @@ _MOST = 20  # largest ratio of unpacked to packed bytes: zeros would have 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
+Axis = int | str | None  # length of an axis: a number; a letter for one length in a file; None for any length
 
 
 class StoreError(RobotDynError):
@@ -61,20 +66,20 @@ class Layout:
         absent: True if the whole array may be nan, for quantities that a run of rollouts did not record.
     """
 
-    shape: tuple[Any, ...]
+    shape: tuple[Axis | tuple[Axis, ...], ...]
     dtype: str = "float64"
     finite: bool = True
     absent: bool = False
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         from pydantic import PlainValidator, ValidationInfo
 
-        def take(name: Any, info: ValidationInfo) -> np.ndarray:
+        def take(name: object, info: ValidationInfo) -> np.ndarray:
             return self._take(name, info.context)
 
         return PlainValidator(take).__get_pydantic_core_schema__(source, handler)
 
-    def _take(self, name: Any, members: Any) -> np.ndarray:
+    def _take(self, name: object, members: Any) -> np.ndarray:
         """Remove and return the array of a name; raise ValueError if it is missing or does not have this layout."""
         if not isinstance(name, str) or name not in members.arrays:
             raise ValueError("its array is missing")
@@ -90,7 +95,7 @@ class Layout:
         return x
 
 
-def _fits(length: int, allowed: Any, lengths: dict[str, int]) -> bool:
+def _fits(length: int, allowed: Axis | tuple[Axis, ...], lengths: dict[str, int]) -> bool:
     if isinstance(allowed, tuple):
         return any(_fits(length, alternative, lengths) for alternative in allowed)
     if isinstance(allowed, str):
@@ -102,7 +107,7 @@ def _fits(length: int, allowed: Any, lengths: dict[str, int]) -> bool:
 class _NotStored:
     """The mark of a field that is None in files."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         return handler(type(None))
 
 
@@ -131,7 +136,7 @@ class StoredFormat(Generic[Stored]):
     error: type[RobotDynError]
     remedy: str
     check: Callable[[Stored, Found], None]
-    other: Callable[[Mapping[str, Any]], str]
+    other: Callable[[Mapping[str, object]], str]
 
     @cached_property
     def _adapter(self) -> Any:

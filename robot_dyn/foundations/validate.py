@@ -10,11 +10,13 @@ from collections.abc import Collection, Sequence
 from math import hypot, inf, isfinite
 from numbers import Real
 from operator import index
-from typing import Any
+from types import UnionType
+from typing import Protocol, SupportsIndex, TypeGuard, TypeVar, overload
 
 import numpy as np
 
 from robot_dyn.foundations.errors import (
+    MissingTimeError,
     NotFiniteError,
     OverflowedError,
     QueryError,
@@ -26,12 +28,31 @@ from robot_dyn.foundations.errors import (
 
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
+Instance = TypeVar("Instance")
+Function = TypeVar("Function")
 LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
 _F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # usual types of entries in lists; bool is excluded
 
 
-def real(values: Any) -> np.ndarray:
+class ArithmeticLike(Protocol):
+    """A kind of number to which arguments are converted, such as an `Arithmetic`."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the entries of arrays."""
+        ...
+
+    def asarray(self, values: object) -> np.ndarray:
+        """Return an array of this kind of number; raise TypeError or ValueError if the values are not numbers."""
+        ...
+
+    def finite(self, x: np.ndarray) -> np.ndarray:
+        """Return True for entries that are finite numbers."""
+        ...
+
+
+def real(values: object) -> np.ndarray:
     """Return real numbers as an array of floats or integers, not copied if they are one.
 
     Raises:
@@ -49,7 +70,7 @@ def real(values: Any) -> np.ndarray:
             array = _of_objects(array)
     except OverflowError:
         raise ValueError("a number too large for a float") from None
-    except (MemoryError, KeyboardInterrupt):
+    except (MemoryError, KeyboardInterrupt, MissingTimeError):
         raise
     except Exception:  # a ragged list, or any error in the conversion of an object
         raise ValueError(shown(values)) from None
@@ -65,7 +86,7 @@ def _of_objects(array: np.ndarray) -> np.ndarray:
     return array.astype(float)
 
 
-def float64(values: Any) -> np.ndarray:
+def float64(values: object) -> np.ndarray:
     """Return real numbers as float64; numbers that are too large become infinite. Raise ValueError like `real`."""
     with np.errstate(over="ignore"):
         return real(values).astype(np.float64, copy=False)
@@ -73,7 +94,7 @@ def float64(values: Any) -> np.ndarray:
 
 def numbers(
     what: str,
-    values: Any,
+    values: object,
     *shapes: Shape,
     error: Kind = QueryError,
     above: float | None = None,
@@ -125,7 +146,7 @@ def _fits(shape: tuple[int, ...], expected: Shape) -> bool:
 
 def number(
     what: str,
-    value: Any,
+    value: object,
     *,
     error: Kind = QueryError,
     above: float | None = None,
@@ -133,12 +154,12 @@ def number(
     infinite: bool = False,
 ) -> float:
     """Return one finite number; for the arguments, see `numbers`."""
-    if value.__class__ is float and isfinite(value) and above is least is None:
+    if type(value) is float and isfinite(value) and above is least is None:
         return value
     return float(numbers(what, value, (), error=error, above=above, least=least, infinite=infinite))
 
 
-def duration(what: str, value: Any, *, zero: bool = False, error: Kind = QueryError) -> float:
+def duration(what: str, value: object, *, zero: bool = False, error: Kind = QueryError) -> float:
     """Return a time in [s], at least 1e-12 s, or 0 if `zero`."""
     seconds = number(what, value, error=error)
     if not (seconds >= 1e-12 or (zero and seconds == 0)):
@@ -147,7 +168,7 @@ def duration(what: str, value: Any, *, zero: bool = False, error: Kind = QueryEr
     return seconds
 
 
-def times(what: str, t: Any) -> np.ndarray:
+def times(what: str, t: object) -> np.ndarray:
     """Return times in [s], finite or not, of any shape, not copied; raise a QueryError for other values."""
     try:
         return float64(t)
@@ -155,7 +176,7 @@ def times(what: str, t: Any) -> np.ndarray:
         raise QueryError(f"{what} must be a time in seconds, got {fault}") from None
 
 
-def rows(what: str, values: Any, *shape: int) -> np.ndarray:
+def rows(what: str, values: object, *shape: int) -> np.ndarray:
     """Return finite numbers of shape (..., *shape), not copied; raise a QueryError for other values."""
     try:
         array = float64(values)
@@ -169,9 +190,9 @@ def rows(what: str, values: Any, *shape: int) -> np.ndarray:
     return array
 
 
-def is_state(x: Any, shape: tuple[int] | None) -> bool:
+def is_state(x: object, shape: tuple[int] | None) -> TypeGuard[np.ndarray]:
     """Return True if Pinocchio can take x unchanged: float64 of that shape."""
-    return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape
+    return type(x) is np.ndarray and x.dtype is _F8 and x.shape == shape
 
 
 def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
@@ -179,17 +200,21 @@ def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
     return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
 
 
-def is_plain(x: Any, shape: tuple[int] | None) -> bool:
+def is_plain(x: object, shape: tuple[int] | None) -> TypeGuard[np.ndarray]:
     """Return True for an `is_state` of moderate numbers: no result overflows, as terms have at most four factors."""
-    return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50
+    return type(x) is np.ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50
 
 
-def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
+def joint_values(
+    what: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+) -> np.ndarray:
     """Return finite numbers of each joint, shape (..., n), not copied; for errors, see `shaped` and `converted`."""
     return converted(what, shaped(what, values, joint_names, arithmetic), joint_names, arithmetic)
 
 
-def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
+def shaped(
+    what: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+) -> np.ndarray:
     """Return numbers of each joint, finite or not, shape (..., n), not copied; floats and integers keep their type.
 
     Args:
@@ -211,7 +236,9 @@ def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any =
     return array
 
 
-def converted(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
+def converted(
+    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+) -> np.ndarray:
     """Convert an array of real numbers to an arithmetic, by default float64; not copied if it has that type.
 
     Raises:
@@ -240,7 +267,9 @@ def _check_rounding(what: str, exact: np.ndarray, rounded: np.ndarray, joint_nam
         )
 
 
-def check_finite(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> None:
+def check_finite(
+    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+) -> None:
     """Raise a NotFiniteError that names the joint unless all numbers of an argument, (..., n), are finite."""
     finite = np.isfinite(array) if arithmetic is None else arithmetic.finite(array)
     if not finite.all():
@@ -249,7 +278,7 @@ def check_finite(what: str, array: Any, joint_names: Sequence[str], arithmetic: 
         raise NotFiniteError(f"{what} must be finite, got {array[place]}{joint}")
 
 
-def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
+def one_state(what: str, values: object, joint_names: Sequence[str]) -> np.ndarray:
     """Return finite numbers of each joint, shape (n,), as a read-only copy; raise a QueryError for other values."""
     array = np.array(joint_values(what, values, joint_names))
     if array.ndim != 1:
@@ -258,7 +287,7 @@ def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
     return array
 
 
-def check_batches(**arrays: Any) -> tuple[int, ...]:
+def check_batches(**arrays: np.ndarray) -> tuple[int, ...]:
     """Return the common batch shape of arguments (..., n); raise a QueryError if they do not broadcast."""
     try:
         return np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
@@ -267,7 +296,9 @@ def check_batches(**arrays: Any) -> tuple[int, ...]:
         raise QueryError(f"batch axes do not match: {shapes}") from None
 
 
-def integer(what: str, value: Any, *, least: int = 0, most: int | None = None, error: Kind = QueryError) -> int:
+def integer(
+    what: str, value: SupportsIndex, *, least: int = 0, most: int | None = None, error: Kind = QueryError
+) -> int:
     """Return an integer from `least` to `most`."""
     try:
         whole = None if isinstance(value, bool) else index(value)
@@ -279,14 +310,14 @@ def integer(what: str, value: Any, *, least: int = 0, most: int | None = None, e
     return whole
 
 
-def truth(what: str, value: Any, *, error: Kind = QueryError) -> bool:
+def truth(what: str, value: object, *, error: Kind = QueryError) -> bool:
     """Return a truth value."""
     if not isinstance(value, bool | np.bool_):
         raise error(f"{what} must be True or False, got {shown(value)}")
     return bool(value)
 
 
-def choice(what: str, value: Any, names: Collection[str], *, error: Kind = QueryError) -> str:
+def choice(what: str, value: object, names: Collection[str], *, error: Kind = QueryError) -> str:
     """Return a name if it is one of the valid ones."""
     if not isinstance(value, str) or value not in names:
         advice = nearest(value if isinstance(value, str) else "", names)
@@ -294,14 +325,18 @@ def choice(what: str, value: Any, names: Collection[str], *, error: Kind = Query
     return value
 
 
-def function(what: str, value: Any, arguments: str, *, error: Kind = QueryError) -> Any:
+def function(what: str, value: Function, arguments: str, *, error: Kind = QueryError) -> Function:
     """Return a function or None; `arguments` lists its arguments for the message."""
     if not (value is None or callable(value)):
         raise error(f"{what} must be a function of {arguments}, or None, got {shown(value)}")
     return value
 
 
-def instance(what: str, value: Any, kind: Any, remedy: str, *, error: Kind = QueryError) -> Any:
+@overload
+def instance(what: str, value: object, kind: type[Instance], remedy: str, *, error: Kind = ...) -> Instance: ...
+@overload
+def instance(what: str, value: object, kind: UnionType, remedy: str, *, error: Kind = ...) -> object: ...
+def instance(what: str, value: object, kind: type | UnionType, remedy: str, *, error: Kind = QueryError) -> object:
     """Return an object of a type; the remedy in the message describes how to get one."""
     if not isinstance(value, kind):
         raise error(f"{what}: {remedy}, got {shown(value)}")

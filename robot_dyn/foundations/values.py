@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import fields
 from functools import cached_property
 from math import prod
 from threading import RLock
-from typing import TYPE_CHECKING, Any, TypeVar, final
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+    from numpy.typing import DTypeLike
 
 LINE = 64  # bytes of a cache line and of the widest vector: a vector across two lines takes two accesses
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
+Key = TypeVar("Key")
+Item = TypeVar("Item")
 
 _MOST = 64  # largest number of values in a cache by identity
 
@@ -23,11 +29,11 @@ _MOST = 64  # largest number of values in a cache by identity
 class Value:
     """A value whose read-only arrays stay read-only through `copy.deepcopy` and `pickle`."""
 
-    def __getstate__(self) -> Any:
+    def __getstate__(self) -> tuple[dict[str, object], tuple[str, ...]]:
         state = dict(vars(self))
         return state, tuple(name for name, x in state.items() if _arrays(x) and not _writeable(x))
 
-    def __setstate__(self, state: Any) -> None:
+    def __setstate__(self, state: tuple[dict[str, object], tuple[str, ...]]) -> None:
         values, frozen = state
         vars(self).update(values)
         for name in frozen:
@@ -43,12 +49,12 @@ class Caching:
         """Computed values, by the functions that computed them."""
         return {}
 
-    def __getstate__(self) -> Any:
+    def __getstate__(self) -> object:
         return {name: x for name, x in vars(self).items() if name != "cache"}
 
 
 def cached(
-    value: Caching, compute: Callable[..., Result], *more: Any, lasts: Callable[[Result], bool] | None = None
+    value: Caching, compute: Callable[..., Result], *more: object, lasts: Callable[[Result], bool] | None = None
 ) -> Result:
     """Return the result of a function of the value, from the cache if it was called before.
 
@@ -67,14 +73,14 @@ def cached(
 
 
 @final
-class LRUByIdentity:
+class LRUByIdentity(Generic[Item]):
     """A cache of the latest values by hashable keys and by the identity of objects, as long as these exist."""
 
     def __init__(self) -> None:
-        self._values: dict[tuple[Any, ...], tuple[list[weakref.ref[Any]], Any]] = {}
+        self._values: dict[tuple[Hashable, ...], tuple[list[weakref.ref[object]], Item]] = {}
         self._lock = RLock()  # runs may start in several threads
 
-    def get(self, objects: tuple[Any, ...], more: tuple[Any, ...], compute: Callable[[], Any]) -> Any:
+    def get(self, objects: tuple[object, ...], more: tuple[Hashable, ...], compute: Callable[[], Item]) -> Item:
         """Return the value of objects and further hashable keys; the value must not refer to the objects."""
         key = (*map(id, objects), *more)
         with self._lock:
@@ -86,7 +92,7 @@ class LRUByIdentity:
                 del self._values[next(iter(self._values))]
             return entry[1]
 
-    def known(self, objects: tuple[Any, ...], more: tuple[Any, ...]) -> Any:
+    def known(self, objects: tuple[object, ...], more: tuple[Hashable, ...]) -> Item | None:
         """Return the value that `get` would return without computing it, or None."""
         with self._lock:
             entry = self._values.get((*map(id, objects), *more))
@@ -115,13 +121,13 @@ class Derived(Value):
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *(field.name for field in fields(self))} - {"_source"})  # pyright: ignore[reportArgumentType]
 
-    def __getstate__(self) -> Any:
+    def __getstate__(self) -> tuple[dict[str, object], tuple[str, ...]]:
         for field in fields(self):  # pyright: ignore[reportArgumentType]
             getattr(self, field.name)
         return super().__getstate__()
 
 
-def derived(kind: type[Late], source: Any, /, **values: Any) -> Late:
+def derived(kind: type[Late], source: object, /, **values: object) -> Late:
     """Create an instance whose missing fields are read from `source` on first access."""
     value = object.__new__(kind)
     vars(value).update({name: _frozen(x) for name, x in values.items()})
@@ -130,15 +136,19 @@ def derived(kind: type[Late], source: Any, /, **values: Any) -> Late:
     return value
 
 
-def copied(x: Any) -> Any:
-    """Copy arrays in tuples."""
+def copied(x: Result) -> Result:
+    """Return a copy of an array, or of a tuple with the arrays in it; other values unchanged."""
+    return _copied(x)
+
+
+def _copied(x: Any) -> Any:
     if isinstance(x, tuple):
-        copies = [copied(entry) for entry in x]
+        copies = [_copied(entry) for entry in x]
         return type(x)(*copies) if hasattr(x, "_fields") else tuple(copies)
     return x.copy() if isinstance(x, np.ndarray) else x
 
 
-def read_only(value: Any) -> None:
+def read_only(value: DataclassInstance) -> None:
     """Replace the arrays of a frozen dataclass, and of dictionaries in it, by read-only views; nothing is copied."""
     for field in fields(value):
         x = getattr(value, field.name)
@@ -146,8 +156,8 @@ def read_only(value: Any) -> None:
             object.__setattr__(value, field.name, _frozen(x))
 
 
-def several(value: Any) -> tuple[Any, ...] | None:
-    """Return the entries of an iterable; None for anything else, such as an array without axes."""
+def several(value: Iterable[Item]) -> tuple[Item, ...] | None:
+    """Return the entries of an iterable; None for an array without axes, or for a value of another type."""
     try:
         return tuple(value)
     except TypeError:
@@ -173,19 +183,19 @@ def _writeable(x: Any) -> bool:
     return any(array.flags.writeable for array in _arrays(x))
 
 
-class OnFirstUse(dict[Any, Any]):
-    """Values by name, computed on first lookup."""
+class OnFirstUse(dict[Key, Item]):
+    """Values by key, computed on first lookup."""
 
-    def __init__(self, compute: Callable[[Any], Any]) -> None:
+    def __init__(self, compute: Callable[[Key], Item]) -> None:
         super().__init__()
         self._compute = compute
 
-    def __missing__(self, name: Any) -> Any:
-        value = self[name] = self._compute(name)
+    def __missing__(self, key: Key) -> Item:
+        value = self[key] = self._compute(key)
         return value
 
 
-def aligned(shape: tuple[int, ...], dtype: Any = float) -> np.ndarray:
+def aligned(shape: tuple[int, ...], dtype: DTypeLike = float) -> np.ndarray:
     """Return an array of zeros in row-major order that begins at a cache line; for objects, at any address."""
     if np.dtype(dtype).hasobject:
         return np.zeros(shape, dtype)

@@ -1,10 +1,10 @@
-"""Methods for y' = f(t, y), one family a file; they know no robot. `method("rk4")` finds one by name.
+"""Methods for y' = f(t, y), one family a file; they know no robot. `method("RK4")` finds one by name.
 
-    by name            method; `integrator="rk4"` of `rd.simulate` takes the same names
-    chosen steps       Adaptive: DOP853, Radau and others, within a tolerance
-    fixed steps        ExplicitRungeKutta, SemiImplicitEuler, Gauss
+    by name            method; `method="RK4"` of `rd.simulate` takes the same names
+    chosen steps       Adaptive: DOP853, Rodas5P or auto, within a tolerance
+    fixed steps        ExplicitRungeKutta, SemiImplicitEuler, GaussLegendre
     stiff, fixed steps Rosenbrock
-    with impacts       TimeStepping
+    with impacts       MoreauJean
     to write one       ButcherTableau, RosenbrockTable, Surd: coefficients as data
                        Integrator, PlainMethod: base classes; Stepper, System, RightSide
     what they return   Solution, Status; IntegrationError

@@ -4,7 +4,7 @@ from robot_dyn.integrate.adaptive import Solution as Solution
 from robot_dyn.integrate.controlled_steps import Status as Status
 from robot_dyn.integrate.explicit import ExplicitRungeKutta as ExplicitRungeKutta
 from robot_dyn.integrate.explicit import SemiImplicitEuler as SemiImplicitEuler
-from robot_dyn.integrate.gauss import Gauss as Gauss
+from robot_dyn.integrate.gauss import GaussLegendre as GaussLegendre
 from robot_dyn.integrate.integrator import IntegrationError as IntegrationError
 from robot_dyn.integrate.integrator import Integrator as Integrator
 from robot_dyn.integrate.integrator import PlainMethod as PlainMethod
@@ -16,7 +16,7 @@ from robot_dyn.integrate.rosenbrock import Rosenbrock as Rosenbrock
 from robot_dyn.integrate.rosenbrock_table import RosenbrockTable as RosenbrockTable
 from robot_dyn.integrate.tableau import ButcherTableau as ButcherTableau
 from robot_dyn.integrate.tableau import Surd as Surd
-from robot_dyn.integrate.time_stepping import TimeStepping as TimeStepping
+from robot_dyn.integrate.time_stepping import MoreauJean as MoreauJean
 
 __all__: list[str]
 

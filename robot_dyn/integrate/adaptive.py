@@ -1,4 +1,4 @@
-"""Methods that choose their steps, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853 and Rosenbrock.
+"""Methods that choose their steps, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853 and Rodas5P.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4–II.6 and II.10; Hairer, Wanner,
 II, 2nd ed., 1996, IV.8]
@@ -20,10 +20,10 @@ from robot_dyn.foundations.validate import choice, function, instance, number, n
 from robot_dyn.integrate import dop853
 from robot_dyn.integrate.controlled_steps import Status, Steps
 from robot_dyn.integrate.integrator import System
-from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
+from robot_dyn.integrate.rosenbrock import RODAS5P_FIXED
 from robot_dyn.integrate.step_control import ControlledStepper, initial_control
 
-EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
+EXPLICIT, STIFF, AUTO = "DOP853", "Rodas5P", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
 
@@ -77,8 +77,8 @@ class Adaptive:
     Tolerances bound the error of a step; that of the run is larger by what the system magnifies.
 
     Attributes:
-        method: DOP853 (explicit, order 8), Rosenbrock (linearly implicit, order 5, L-stable), or auto: a simulation by
-            DOP853 that Rosenbrock takes over if stability bounds its steps.
+        method: DOP853 (explicit, order 8), Rodas5P (linearly implicit, order 5, L-stable), or auto: a simulation by
+            DOP853 that Rodas5P takes over if stability bounds its steps.
         rtol: Relative tolerance, 2.3e-14 at least.
         atol: Absolute tolerance, in the unit of y, not negative.
         max_step_s: Longest step, in [s].
@@ -179,7 +179,7 @@ class Adaptive:
 
 # Each method for a loop, of (entries of the state, rows of the rate, entries whose error counts).
 STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType(
-    {EXPLICIT: dop853.stepper, STIFF: ROSENBROCK_5.controlled, AUTO: dop853.stepper}
+    {EXPLICIT: dop853.stepper, STIFF: RODAS5P_FIXED.controlled, AUTO: dop853.stepper}
 )
 
 

@@ -95,7 +95,7 @@ class SemiImplicitEuler(PlainMethod):
     Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, I.1.2 and VI.3.
     """
 
-    name: str = "semi_implicit_euler"
+    name: str = "SemiImplicitEuler"
     order: int = field(default=1, init=False)
     evaluations_per_step: int | None = field(default=1, init=False)
 
@@ -108,14 +108,14 @@ class SemiImplicitEuler(PlainMethod):
 _HALF, _THIRD, _SIXTH = Fraction(1, 2), Fraction(1, 3), Fraction(1, 6)
 
 # deck 001: q⁺ = q + v dt, v⁺ = v + a dt. Euler, 1768.
-EXPLICIT_EULER = ExplicitRungeKutta("explicit_euler", ButcherTableau(a=((),), b=(1,), c=(0,), order=1))
+EULER = ExplicitRungeKutta("Euler", ButcherTableau(a=((),), b=(1,), c=(0,), order=1))
 
 # Runge, 1895. HNW I, II.1, (1.4)
-MIDPOINT = ExplicitRungeKutta("midpoint", ButcherTableau(a=((), (_HALF,)), b=(0, 1), c=(0, _HALF), order=2))
+MIDPOINT = ExplicitRungeKutta("Midpoint", ButcherTableau(a=((), (_HALF,)), b=(0, 1), c=(0, _HALF), order=2))
 
 # Kutta, 1901. HNW I, table II.1.2
 RK4 = ExplicitRungeKutta(
-    "rk4",
+    "RK4",
     ButcherTableau(
         a=((), (_HALF,), (0, _HALF), (0, 0, 1)),
         b=(_SIXTH, _THIRD, _THIRD, _SIXTH),
@@ -126,7 +126,7 @@ RK4 = ExplicitRungeKutta(
 
 
 @cache
-def order_8() -> ExplicitRungeKutta:
+def dp8() -> ExplicitRungeKutta:
     """Return the method of order 8 with 12 stages of Dormand and Prince, at a fixed step.
 
     Its coefficients are SciPy's, rounded to float64: in longdouble they bound the accuracy of a step to some 1e-16 h.
@@ -136,5 +136,5 @@ def order_8() -> ExplicitRungeKutta:
     DOP853 = table()
     a = tuple(tuple(map(float, row[:i])) for i, row in enumerate(DOP853.A))
     return ExplicitRungeKutta(
-        "order_8", ButcherTableau(a, tuple(map(float, DOP853.B)), tuple(map(float, DOP853.C)), order=8)
+        "DP8", ButcherTableau(a, tuple(map(float, DOP853.B)), tuple(map(float, DOP853.C)), order=8)
     )

@@ -99,7 +99,7 @@ def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Any, h:
 
 @final
 @dataclass(frozen=True)
-class Gauss(PlainMethod):
+class GaussLegendre(PlainMethod):
     """Gauss–Legendre collocation of order 2, 4 or 6, its stages solved by fixed-point iteration until rounding ends it.
 
     The iteration converges where h is small against the fastest motion, h L ‖A‖ < 1 with L the Lipschitz constant of f,
@@ -121,7 +121,7 @@ class Gauss(PlainMethod):
     def __post_init__(self) -> None:
         if integer("order", self.order) not in _TABLEAUS:
             raise QueryError(f"no Gauss method of order {self.order!r}: give 2, 4 or 6")
-        object.__setattr__(self, "name", f"gauss_{self.order}")
+        object.__setattr__(self, "name", f"GaussLegendre{self.order}")
 
     @property
     def tableau(self) -> ButcherTableau:

@@ -1,6 +1,6 @@
 """Integration methods by name, as used by scenes and by every function that takes a method.
 
-    y⁺ = method("rk4").step(system, t, y, h)
+    y⁺ = method("RK4").step(system, t, y, h)
 
 Each method cites its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
 """
@@ -14,29 +14,29 @@ from typing import Any
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import choice
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
-from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
-from robot_dyn.integrate.gauss import Gauss
+from robot_dyn.integrate.explicit import EULER, MIDPOINT, RK4, SemiImplicitEuler, dp8
+from robot_dyn.integrate.gauss import GaussLegendre
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
-from robot_dyn.integrate.time_stepping import TimeStepping
+from robot_dyn.integrate.rosenbrock import RODAS5P_FIXED
+from robot_dyn.integrate.time_stepping import MoreauJean
 
 _READY = (
-    EXPLICIT_EULER,
+    EULER,
     SemiImplicitEuler(),
     MIDPOINT,
     RK4,
-    Gauss(2),
-    Gauss(4),
-    Gauss(6),
-    ROSENBROCK_5,
-    TimeStepping(),
+    GaussLegendre(2),
+    GaussLegendre(4),
+    GaussLegendre(6),
+    RODAS5P_FIXED,
+    MoreauJean(),
 )
 
-# Factories for the methods; order_8 reads SciPy's coefficients only when it is used.
+# Factories for the methods; DP8 reads SciPy's coefficients only when it is used.
 METHODS: Mapping[str, Callable[[], Integrator | Adaptive]] = MappingProxyType(
     {
         **{ready.name: lambda ready=ready: ready for ready in _READY},
-        "order_8": order_8,
+        "DP8": dp8,
         **{name: lambda name=name: Adaptive(name) for name in ADAPTIVE},
     }
 )
@@ -62,6 +62,6 @@ def as_method(value: Any) -> Integrator | Adaptive:
         return method(value)
     if not isinstance(value, Integrator | Adaptive):
         raise QueryError(
-            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(value)}"
+            f"method: give a name, such as 'RK4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(value)}"
         )
     return value

@@ -178,4 +178,4 @@ class Rosenbrock(PlainMethod):
         )
 
 
-ROSENBROCK_5 = Rosenbrock("rosenbrock_5", RODAS5P)
+RODAS5P_FIXED = Rosenbrock("Rodas5PFixed", RODAS5P)

@@ -125,14 +125,14 @@ def solved_alone(rows: Problem, work: Work, out: Array, b: int) -> bool:
 
 @final
 @dataclass(frozen=True)
-class TimeStepping(PlainMethod):
+class MoreauJean(PlainMethod):
     """The method of Moreau and Jean: of order 1, through impacts and sticking friction, without events.
 
     On an equation y' = f(t, y) without jumps it is a method like others, with y = (q, v, quadratures)
     and q' = v.
     """
 
-    name: str = "time_stepping"
+    name: str = "MoreauJean"
     order: int = field(default=1, init=False)
     evaluations_per_step: int | None = field(default=1, init=False)
 

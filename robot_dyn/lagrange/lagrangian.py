@@ -86,16 +86,18 @@ class Lagrangian(Dynamics[Array], Parametrised):
     def inertial_parameters(self) -> Array:  # pyright: ignore[reportIncompatibleMethodOverride]
         return np.concatenate([parameters(self.linkage.inertias[i]) for i in self.linkage.order])
 
-    def mass_matrix_derivative(self, q: ArrayLike, *, errors: str = "raise") -> Array:
+    def mass_matrix_derivative(self, q: ArrayLike) -> Array:
         """Return ∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
         return self._evaluated(
-            _MASS_MATRIX_DERIVATIVE, lambda at: mass_matrix_derivative(at, summands_of_bodies(at)), (q,), errors
+            _MASS_MATRIX_DERIVATIVE, lambda at: mass_matrix_derivative(at, summands_of_bodies(at)), (q,), False
         )
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Array:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Array:
         if frame:
             frame = (self._link(frame[0]), *map(Axes.of, frame[1:]))
-        return into(out, self._evaluated(QUANTITIES[name], FORMULAS[name], state, errors, *frame))
+        return into(out, self._evaluated(QUANTITIES[name], FORMULAS[name], state, nan, *frame))
 
     def _link(self, frame: str) -> str:
         """Return the link of a frame, which may be named by its joint; raise QueryError for an unknown frame."""
@@ -105,7 +107,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
 
     @in_arithmetic
     def _evaluated(
-        self, quantity: Quantity, formula: Callable[..., Any], state: tuple[Any, ...], errors: str, *frame: str
+        self, quantity: Quantity, formula: Callable[..., Any], state: tuple[Any, ...], nan: bool, *frame: str
     ) -> Array:
         """Evaluate a formula at the configuration of all bodies, or only of those that carry a link."""
 
@@ -118,4 +120,4 @@ class Lagrangian(Dynamics[Array], Parametrised):
             for name, x in zip(quantity.arguments, state, strict=True)
         }
         shape = quantity.shape(self.sizes)
-        return answered(equation, arrays, shape, self.joint_names, errors, self.arithmetic)
+        return answered(equation, arrays, shape, self.joint_names, nan, self.arithmetic)

@@ -46,7 +46,7 @@ class Evaluation:
         return regularity(self._batched("M")(np.linspace(0.3, 0.9, len(names))), names)
 
     @cached_property
-    def one_state(self) -> OnFirstUse:
+    def one_state(self) -> OnFirstUse[str | tuple[str, ...], Call]:
         """Queries at one state as functions (data, q, …), by name or (name, frame, axes), with coupled joints."""
         return OnFirstUse(self._one_state)
 
@@ -67,15 +67,15 @@ class Evaluation:
         return coupled
 
     @cached_property
-    def _calls(self) -> OnFirstUse:
+    def _calls(self) -> OnFirstUse[tuple[str, ...], Call]:
         """Pinocchio's calls by (name, frame, axes)."""
         return OnFirstUse(lambda query: PINOCCHIO[query[0]](self.built, *query[1:]))
 
-    def answer(self, name: str, state: tuple[Any, ...], errors: str, *frame: str) -> Any:
-        """Return the result of a query at one state or a batch; errors="nan" gives NaN at states without one."""
+    def answer(self, name: str, state: tuple[Any, ...], nan: bool, *frame: str) -> Any:
+        """Return the result of a query at one state or a batch; with `nan`, NaN at states without one."""
         if QUANTITIES[name].solves:
-            return self._forward_dynamics(state, errors)
-        return self._answered(name, state, errors, self._batched(name, *frame))
+            return self._forward_dynamics(state, nan)
+        return self._answered(name, state, nan, self._batched(name, *frame))
 
     def _solved(self, data: Any, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
         """Return forward dynamics at one state; on the fast path if joints are coupled and M is regular."""
@@ -86,9 +86,9 @@ class Evaluation:
             a = acceleration(M, tau - couplings.torque(bias), built.joint_names)
             if is_moderate(a, DOUBTFUL):
                 return a
-        return self._forward_dynamics((q, v, tau), "raise")
+        return self._forward_dynamics((q, v, tau), nan=False)
 
-    def _forward_dynamics(self, state: tuple[Any, ...], errors: str) -> ndarray:
+    def _forward_dynamics(self, state: tuple[Any, ...], nan: bool) -> ndarray:
         """Return M⁻¹ (τ − C v − N), by ABA or, for coupled joints, a Cholesky factor of M; raise if M is singular."""
         if self.regularity.singular is not None:
             raise self.regularity.singular()
@@ -101,7 +101,7 @@ class Evaluation:
                 acceleration(here, tau, names)  # raises if M is singular at this q
             return a
 
-        return self._answered("forward_dynamics", state, errors, equation)
+        return self._answered("forward_dynamics", state, nan, equation)
 
     def _batched(self, name: str, *frame: str) -> Callable[..., ndarray]:
         """Return a query as a function (q, …) of arrays (..., n), which evaluates one state after another."""
@@ -121,8 +121,8 @@ class Evaluation:
 
         return equation
 
-    def _answered(self, name: str, state: tuple[Any, ...], errors: str, equation: Callable[..., ndarray]) -> Any:
+    def _answered(self, name: str, state: tuple[Any, ...], nan: bool, equation: Callable[..., ndarray]) -> Any:
         names, quantity = self.built.joint_names, QUANTITIES[name]
         arrays = {key: shaped(key, x, names) for key, x in zip(quantity.arguments, state, strict=True)}
-        answer = answered(equation, arrays, quantity.shape(self.built.sizes), names, errors)
+        answer = answered(equation, arrays, quantity.shape(self.built.sizes), names, nan)
         return answer if answer.ndim else float(answer)

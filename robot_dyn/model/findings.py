@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.description.coordinate_limits import position_limits, speed_limits
 from robot_dyn.description.couplings import resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import implausibility
+from robot_dyn.description.markup import parse
+from robot_dyn.description.other_programs import ARMATURE, STIFFNESS, of_coordinates, statements
 from robot_dyn.description.structure import StatedLink, Structure, stands_on, structure_of
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
@@ -23,6 +26,7 @@ from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularit
 
 LONGEST = 1e4  # [m], also for a mimic's multiplier: sums with such a length have rounding errors of 1e-12 m
 LIGHTEST = 1e-12  # [kg]
+_OTHER_PROGRAMS = b"otorInertia", b"rotor_inertia", b"tiffness"  # parts of all elements that `for_other_programs` reads
 _LISTED = 6  # maximum number of names in a finding
 
 
@@ -31,13 +35,14 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach,
         centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_limits, equal_limits,
+        followers_beyond_limits,
         impossible_inertias_of_the_base,
     )  # fmt: skip
     robot = structure_of(description, edits)
     of_kinds = (finding for kind in kinds for finding in kind(robot))
     joint = None if regularity.near else regularity.joint
     singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)
-    return (*reservations(description), *singular, *of_kinds, *near)
+    return (*reservations(description), *singular, *of_kinds, *near, *for_other_programs(robot, description))
 
 
 def reservations(description: Description) -> tuple[str, ...]:
@@ -175,6 +180,43 @@ def equal_limits(robot: Structure) -> Iterator[str]:
     """Report joints whose lower and upper limits are equal."""
     if names := [name for name in robot.free if robot.joints[name].lower == robot.joints[name].upper]:
         yield f"{_joints(names)}: the lower and upper limits are equal; correct them, or make the joint fixed"
+
+
+def followers_beyond_limits(robot: Structure) -> Iterator[str]:
+    """Report followers that leave their own limits while the joint they follow is within its limits."""
+    for of_joints, kind in ((position_limits(robot), "position"), (speed_limits(robot), "velocity")):
+        for source, limit in of_joints.items():
+            for name, (low, high) in limit.exceeded.items():
+                yield (
+                    f"joint {name!r}: follows {source!r} beyond its own {kind} limits, [{low:g}, {high:g}], which are"
+                    f" not enforced, because {source!r} would keep hardly any range; correct its <limit> or <mimic>"
+                )
+
+
+def for_other_programs(robot: Structure, description: Description) -> Iterator[str]:
+    """Report rotors and springs that the file states for other programs and that no edit has added."""
+    if not any(word in description.text for word in _OTHER_PROGRAMS):
+        return
+    stated = of_coordinates(robot, statements(parse(description.text, description.source)[0]))
+    armature = {
+        name: x[ARMATURE] for name, x in stated.items() if x.get(ARMATURE) and name not in dict(robot.edits.armature)
+    }
+    stiffness = {name: x[STIFFNESS] for name, x in stated.items() if x.get(STIFFNESS)}
+    for numbers, what, remedy in (
+        (
+            armature,
+            "a rotor inertia at the joint of {} kg m² or kg, which is not in M",
+            'with_(armature="urdf") adds it',
+        ),
+        (
+            stiffness,
+            "a spring of {} N m/rad or N/m, which does not act",
+            'the effect Spring("urdf", rest="urdf") adds it',
+        ),
+    ):
+        if numbers:
+            largest = f"{'up to ' if len(numbers) > 1 else ''}{max(numbers.values()):.3g}"
+            yield f"{_joints(numbers)}: the file states for other programs {what.format(largest)}; {remedy}"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:

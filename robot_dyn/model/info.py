@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from robot_dyn.description.catalog import abbreviated
+from robot_dyn.description.coordinate_limits import position_limits, speed_limits
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits, Payload
+from robot_dyn.description.other_programs import Statement, in_words
+from robot_dyn.description.structure import Structure
 from robot_dyn.foundations.answer import Answer, Block, Table
 
 _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature"
@@ -55,10 +58,14 @@ class Info(Answer):
         gravity_acts: True if gravity exerts a torque on a joint at some position.
         joints: Independent joints, in the order of q.
         couplings: Joints that follow another one, as stated by the file.
+        narrowed: Followers that reach their own limits before their joint reaches its own, by joint: they narrow
+            its `lower`, `upper` or `velocity_limit`.
         locked: Value of each locked joint, in [rad] or [m].
         payloads: Payloads that were added.
         estimated: Basis of each inertia that is estimated, not measured, by link.
         links: Names of the frames.
+        other_programs: Rotors, springs and soft limits that the file states for other programs, see
+            `Robot.statements`.
         findings: Doubtful values in the description, each with its remedy.
     """
 
@@ -70,10 +77,12 @@ class Info(Answer):
     gravity_acts: bool
     joints: tuple[Joint, ...]
     couplings: tuple[Coupling, ...]
+    narrowed: dict[str, tuple[str, ...]]
     locked: dict[str, float]
     payloads: tuple[Payload, ...]
     estimated: dict[str, str]
     links: tuple[str, ...]
+    other_programs: tuple[Statement, ...]
     findings: tuple[str, ...]
 
     def blocks(self) -> Iterator[Block]:
@@ -86,8 +95,11 @@ class Info(Answer):
         for coupling in self.couplings:
             equation = f"{coupling.multiplier:g} · {coupling.source} + {coupling.offset:g}"
             yield f"coupled: {coupling.joint} = {equation}"
+        for joint, followers in self.narrowed.items():
+            yield f"limits of {joint}: narrowed by those of {', '.join(followers)}"
         yield from _edits(self.locked, self.payloads)
         yield from (f"estimated: {link}: {basis}" for link, basis in self.estimated.items())
+        yield from (f"for other programs: {line}" for line in in_words(self.other_programs))
         yield from (f"finding: {finding}" for finding in self.findings)
 
 
@@ -122,6 +134,14 @@ def couplings_of(description: Description, moving: Collection[str]) -> Iterator[
         if joint.get("name") in moving:
             name: Any = joint.get("name")
             yield Coupling(name, mimic.get("joint"), float(mimic.get("multiplier")), float(mimic.get("offset")))
+
+
+def narrowed(robot: Structure) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Return each joint whose limits are narrowed by its followers, with their names."""
+    speeds = speed_limits(robot)
+    for joint, position in position_limits(robot).items():
+        if names := (*position.narrowed_by, *speeds[joint].narrowed_by):
+            yield joint, tuple(dict.fromkeys(names))
 
 
 def no_torque(gravity: tuple[float, float, float]) -> str:

@@ -22,10 +22,23 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
+from robot_dyn.description.coordinate_limits import CoordinateLimit, position_limits, speed_limits
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
 from robot_dyn.description.inertial_parameters import Parametrised
+from robot_dyn.description.markup import parse
+from robot_dyn.description.other_programs import (
+    ARMATURE,
+    LOWER,
+    REST,
+    STIFFNESS,
+    UPPER,
+    Statement,
+    of_coordinates,
+    statements,
+)
+from robot_dyn.description.structure import Structure, structure_of
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import (
     DescriptionError,
@@ -42,7 +55,7 @@ from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.from_pinocchio import described
-from robot_dyn.model.info import Info, Joint, couplings_of, no_torque, robot_line
+from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, no_torque, robot_line
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
 from robot_dyn.model.to_urdf import write_urdf
 from robot_dyn.queries.batch import into
@@ -50,7 +63,6 @@ from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
 
 _F8 = np.dtype(float)
-_RAISE = "raise"
 _STATES = 3  # N is analytic in q: if zero at random states, it is zero everywhere
 # named like an entry point, so that building a model does not import the digit counter
 _CHECK_OF_NEARLY_SINGULAR = "robot_dyn.accuracy.correct_digits:DigitCheck"
@@ -74,8 +86,10 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
     edits: Edits = field(default_factory=Edits)
     answer_check: AnswerCheck | None = None
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
-        if out is None and errors is _RAISE:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Any:
+        if out is None and not nan:
             shape, scratch, one_state = self._at_once
             for x in state:
                 if not (x.__class__ is ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50):
@@ -87,42 +101,38 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
                     pass
                 else:
                     return call(scratch.data, *state)
-        answer = self._evaluation.answer(name, state, errors, *frame)
+        answer = self._evaluation.answer(name, state, nan, *frame)
         if self.answer_check is not None:
             self.answer_check(self, name, state, answer)
         return into(out, answer)
 
     # --- queries that take microseconds, with a fast path
 
-    def M(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
+    def M(self, q: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._answer("M", (q,), out, errors)
+        return self._answer("M", (q,), out)
 
-    def N(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
+    def N(self, q: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._answer("N", (q,), out, errors)
+        return self._answer("N", (q,), out)
 
-    def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: ndarray | None = None, errors: str = "raise"
-    ) -> ndarray:
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         shape = self._uncoupled_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf in any argument propagate to tau
                 return tau
-        return self._answer("inverse_dynamics", (q, v, a), out, errors)
+        return self._answer("inverse_dynamics", (q, v, a), out)
 
-    def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: ndarray | None = None, errors: str = "raise"
-    ) -> ndarray:
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         shape = self._regular_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
             if is_moderate(a, DOUBTFUL):
                 return a
-        return self._answer("forward_dynamics", (q, v, tau), out, errors)
+        return self._answer("forward_dynamics", (q, v, tau), out)
 
     # --- properties
 
@@ -153,13 +163,13 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def lower(self) -> ndarray:
-        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated."""
-        return self._per_joint(self.model.lowerPositionLimit)
+        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated; those of followers count, see `info`."""
+        return self._limits(position_limits, "lower")
 
     @cached_property
     def upper(self) -> ndarray:
-        """Upper position limits, (n,) in [rad] or [m]; inf if unstated."""
-        return self._per_joint(self.model.upperPositionLimit)
+        """Upper position limits, (n,) in [rad] or [m]; inf if unstated; those of followers count, see `info`."""
+        return self._limits(position_limits, "upper")
 
     @cached_property
     def effort_limit(self) -> ndarray:
@@ -168,8 +178,8 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def velocity_limit(self) -> ndarray:
-        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated."""
-        return self._per_joint(self.model.velocityLimit)
+        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated; those of followers count, see `info`."""
+        return self._limits(speed_limits, "upper")
 
     @cached_property
     def gravity(self) -> ndarray:
@@ -180,6 +190,39 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
     def armature(self) -> ndarray:
         """Inertia of the drives reflected to the joints, (n,) in [kg m²] or [kg]; part of M."""
         return self._per_joint(self.model.armature)
+
+    @cached_property
+    def statements(self) -> tuple[Statement, ...]:
+        """Rotors, springs and soft limits that the file states for other programs; none acts unless you ask for it."""
+        return statements(parse(self.description.text, self.description.source)[0])
+
+    @cached_property
+    def stated_armature(self) -> ndarray:
+        """Reflected rotor inertia n² J that the file states for other programs, (n,) in [kg m²] or [kg]; 0 if none.
+
+        `with_(armature="urdf")` adds it to M.
+        """
+        return self._stated(ARMATURE, 0.0)
+
+    @cached_property
+    def stated_stiffness(self) -> ndarray:
+        """Stiffness of joint springs that the file states for other programs, (n,) in [N m/rad] or [N/m]; 0 if none."""
+        return self._stated(STIFFNESS, 0.0)
+
+    @cached_property
+    def stated_rest(self) -> ndarray:
+        """Rest positions of these springs, (n,) in [rad] or [m]."""
+        return self._stated(REST, 0.0)
+
+    @cached_property
+    def soft_lower(self) -> ndarray:
+        """Lower soft limits of <safety_controller>, (n,) in [rad] or [m]; −inf if unstated."""
+        return self._stated(LOWER, -np.inf)
+
+    @cached_property
+    def soft_upper(self) -> ndarray:
+        """Upper soft limits of <safety_controller>, (n,) in [rad] or [m]; inf if unstated."""
+        return self._stated(UPPER, np.inf)
 
     @cached_property
     def damping(self) -> ndarray:
@@ -248,7 +291,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         length += max(float(np.linalg.norm(body.lever)) for body in self.model.inertias)
         try:
             return bool(
-                np.abs(self._evaluation.answer("N", (q,), _RAISE)).max() > _ROUNDING * self.total_mass * g * length
+                np.abs(self._evaluation.answer("N", (q,), nan=False)).max() > _ROUNDING * self.total_mass * g * length
             )
         except RobotDynError:  # overflows: far from zero
             return True
@@ -313,15 +356,18 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
         Args:
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
-                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale;
-                masses and inertias: values by link that replace the file's, in [kg], and (3, 3) in [kg m²].
+                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg], or
+                "urdf" for `stated_armature`; mass_scale; masses and inertias: values by link that replace the
+                file's, in [kg], and (3, 3) in [kg m²].
 
         Raises:
-            EditError: If a name is unknown or a value is not allowed.
+            EditError: If a name is unknown or a value is not allowed, or "urdf" is given and the file states none.
 
         Warns:
             ModelWarning: If the new gravity is not zero and exerts no torque on any joint.
         """
+        if isinstance(armature := changes.get("armature"), str) and armature == "urdf":
+            changes["armature"] = self._armature_of_file()
         robot = Robot(self.description, self.edits.with_(self.joint_names, **changes))
         gravity = robot.edits.gravity
         if gravity != self.edits.gravity and any(gravity) and not robot.gravity_acts:
@@ -406,6 +452,21 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         ids = joint_ids(self.model)
         return _frozen(np.concatenate([self.model.inertias[ids[x]].toDynamicParameters() for x in self.body_names]))
 
+    def _limits(self, limits: Callable[[Structure], dict[str, CoordinateLimit]], side: str) -> ndarray:
+        """Return one side of the limits of the coordinates, in the order of q."""
+        of_joints = limits(structure_of(self.description, self.edits))
+        return _frozen(np.array([getattr(of_joints[name], side) for name in self.joint_names]))
+
+    def _stated(self, quantity: str, unstated: float) -> ndarray:
+        """Return a quantity that the file states for other programs, in the order of q."""
+        numbers = of_coordinates(structure_of(self.description, self.edits), self.statements)
+        return _frozen(np.array([numbers[name].get(quantity, unstated) for name in self.joint_names]))
+
+    def _armature_of_file(self) -> ndarray:
+        if not self.stated_armature.any():
+            raise EditError(f"armature='urdf': the file of {self.name} states no rotor inertia; give it by joint")
+        return self.stated_armature
+
     def _per_joint(self, full: ndarray) -> ndarray:
         """Return values of the joints of `model` in the order of q; infinite where the file states no limit."""
         ids = joint_ids(self.model)
@@ -437,10 +498,12 @@ def info(robot: Robot) -> Info:
         gravity_acts=robot.gravity_acts,
         joints=tuple(Joint(*row) for row in rows),
         couplings=tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
+        narrowed=dict(narrowed(structure_of(robot.description, robot.edits))),
         locked=dict(robot.edits.lock),
         payloads=robot.edits.payloads,
         estimated=dict(robot.estimated),
         links=robot.frame_names,
+        other_programs=robot.statements,
         findings=robot.findings,
     )
 

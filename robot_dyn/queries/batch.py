@@ -1,6 +1,6 @@
 """Batches: a query evaluates all states, or raises an error that names the first one without a result.
 
-With errors="nan" states without a result become NaN. A batch is evaluated as a whole; if that fails, it is halved until
+For `nan_rows`, states without a result become NaN. A batch is evaluated as a whole; if that fails, it is halved until
 the states without a result are isolated.
 """
 
@@ -19,7 +19,6 @@ from robot_dyn.foundations.errors import (
     QueryError,
     RobotDynError,
     SingularError,
-    shown,
 )
 from robot_dyn.foundations.validate import check_batches, converted
 
@@ -35,7 +34,7 @@ def answered(
     arrays: Mapping[str, Array],
     shape: tuple[int, ...],
     joint_names: tuple[str, ...],
-    errors: str = "raise",
+    nan: bool = False,
     arithmetic: Arithmetic = FLOAT64,
 ) -> Array:
     """Return the results of a batch of states, (..., *shape).
@@ -45,17 +44,15 @@ def answered(
         arrays: Arguments by name, each (..., n), or (..., 1) for the time t; floats and integers of any type.
         shape: Shape of the result for one state.
         joint_names: Names of the joints, for messages.
-        errors: "raise", or "nan" for NaN at states without a result.
+        nan: True for NaN at states without a result, False for an error.
         arithmetic: Arithmetic of arguments and results.
 
     Raises:
-        QueryError: If the batch axes do not match or `errors` is invalid.
+        QueryError: If the batch axes do not match.
         NotFiniteError: If an argument is not finite.
         OverflowedError: If a result is not finite, or q or t is too large for the arithmetic.
         SingularError: If M is singular in forward dynamics. In a batch, all of these name the row.
     """
-    if errors.__class__ is not str or errors not in ("raise", "nan"):
-        raise QueryError(f"errors must be 'raise' or 'nan', got {shown(errors)}")
     batch = check_batches(**arrays)
 
     def attempt(*values: Array) -> Array:
@@ -73,11 +70,11 @@ def answered(
         try:
             return attempt(*arrays.values())
         except (*_REFUSALS, DoubtError):
-            if not batch and errors == "raise":
+            if not batch and not nan:
                 raise
         rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
         result = np.full((len(rows[0]), *shape), arithmetic.number("nan"), dtype=arithmetic.dtype)
-        _halved(attempt, rows, result, 0, len(result), batch, errors)
+        _halved(attempt, rows, result, 0, len(result), batch, nan)
         _together(attempt, rows, result, arithmetic)
     return result.reshape((*batch, *shape))
 
@@ -104,18 +101,18 @@ def _halved(
     start: int,
     stop: int,
     batch: tuple[int, ...],
-    errors: str,
+    nan: bool,
 ) -> None:
-    """Evaluate the states start … stop − 1; with errors="nan" states without a result are left unchanged."""
+    """Evaluate the states start … stop − 1; with `nan`, states without a result are left unchanged."""
     alone = stop - start == 1
     try:
         result[start:stop] = attempt(*(x[start] if alone else x[start:stop] for x in rows))
     except (*_REFUSALS, DoubtError) as error:
         if not alone:
             middle = (start + stop) // 2
-            _halved(attempt, rows, result, start, middle, batch, errors)
-            _halved(attempt, rows, result, middle, stop, batch, errors)
-        elif errors == "raise":
+            _halved(attempt, rows, result, start, middle, batch, nan)
+            _halved(attempt, rows, result, middle, stop, batch, nan)
+        elif not nan:
             error.row = tuple(int(i) for i in np.unravel_index(start, batch))
             where = error.row[0] if len(batch) == 1 else error.row
             error.args = (f"{error} in row {where} of the batch",)

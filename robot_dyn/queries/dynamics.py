@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
@@ -78,8 +78,8 @@ class Dynamics(ABC, Generic[Answer]):
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
     joint and [m], [m/s], [m/s²], [N] for a prismatic one. Twists are (linear, angular). Every method raises
     QueryError for a wrong shape, a non-finite value or an unknown frame, and OverflowedError if the result would not be
-    finite; in a batch the message and the error's `row` identify the state. With errors="nan" only the states of a
-    batch without a result become NaN.
+    finite; in a batch the message and the error's `row` identify the state. The queries of `nan_rows` return NaN for
+    such states instead.
 
     An engine defines `n`, `joint_names` and `_answer`; it overrides a query only to add a fast path for one state.
     """
@@ -95,120 +95,140 @@ class Dynamics(ABC, Generic[Answer]):
         """Names of the n joints, in the order of q."""
 
     @abstractmethod
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Any:
         """Return the result of a query.
 
         Args:
             name: Name of the query.
             state: Arguments as passed by the user.
             out: Array for the result, or None.
-            errors: "raise" or "nan".
             frame: Frame and axes of its twist, if the query has them.
+            nan: True for NaN at states without a result, False for an error.
         """
 
+    @property
+    def nan_rows(self) -> Dynamics[Answer]:
+        """The same queries, with NaN instead of an error for each state without a result.
+
+        A state has no result if it is not finite, the result would overflow, or M is singular in forward dynamics.
+        """
+        return NanRows(self)
+
     @query("n", "n", unit="kg m²", terms=lambda size, x: size.M, definite=True, digits=True)
-    def M(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+    def M(self, q: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Mass matrix of the kinetic energy K = ½ vᵀ M v, symmetric positive definite."""
-        return self._answer("M", (q,), out, errors)
+        return self._answer("M", (q,), out)
 
     @query("n", "n", unit="N m s/rad", terms=lambda size, x: size.C(x["v"]), digits=True)
-    def C(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+    def C(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ."""
-        return self._answer("C", (q, v), out, errors)
+        return self._answer("C", (q, v), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.N, digits=True)
-    def N(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+    def N(self, q: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Gravity torque ∂V/∂q: the torque that holds the robot at rest."""
-        return self._answer("N", (q,), out, errors)
+        return self._answer("N", (q,), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.C(x["v"]) @ x["v"])
-    def coriolis_torque(
-        self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
-    ) -> Answer:
+    def coriolis_torque(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Coriolis and centrifugal torque C(q, v) v."""
-        return self._answer("coriolis_torque", (q, v), out, errors)
+        return self._answer("coriolis_torque", (q, v), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.C(x["v"]).T @ x["v"])
-    def coriolis_transpose(
-        self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
-    ) -> Answer:
+    def coriolis_transpose(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Cᵀ(q, v) v = ∂K/∂q, used by momentum observers: d(M v)/dt = τ + Cᵀ v − N."""
-        return self._answer("coriolis_transpose", (q, v), out, errors)
+        return self._answer("coriolis_transpose", (q, v), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.inverse_dynamics(x["v"], x["a"]), digits=True)
-    def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
-    ) -> Answer:
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Torque of an acceleration: τ = M a + C v + N."""
-        return self._answer("inverse_dynamics", (q, v, a), out, errors)
+        return self._answer("inverse_dynamics", (q, v, a), out)
 
     @query("n", unit="rad/s²", terms=_solved_torque, solves=True, doubtful=DOUBTFUL, digits=True)
-    def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
-    ) -> Answer:
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Acceleration of a torque: a = M⁻¹ (τ − C v − N)."""
-        return self._answer("forward_dynamics", (q, v, tau), out, errors)
+        return self._answer("forward_dynamics", (q, v, tau), out)
 
     @query(unit="J", terms=lambda size, x: x["v"] @ size.M @ x["v"] / 2)
-    def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Any:
+    def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Any:
         """Kinetic energy K = ½ vᵀ M v."""
-        return self._answer("kinetic_energy", (q, v), out, errors)
+        return self._answer("kinetic_energy", (q, v), out)
 
     @query(unit="J", terms=lambda size, x: size.V)
-    def potential_energy(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Any:
+    def potential_energy(self, q: ArrayLike, *, out: Answer | None = None) -> Any:
         """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the moving bodies, 0 at the origin of the base."""
-        return self._answer("potential_energy", (q,), out, errors)
+        return self._answer("potential_energy", (q,), out)
 
     @query("n", unit="N m s", terms=lambda size, x: size.M @ x["v"])
-    def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+    def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Generalised momentum p = ∂K/∂v = M v."""
-        return self._answer("momentum", (q, v), out, errors)
+        return self._answer("momentum", (q, v), out)
 
     @query("n", "p", unit="N m by parameter", terms=lambda size, x: size.regressor(x["v"], x["a"]))
-    def regressor(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
-    ) -> Answer:
+    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None) -> Answer:
         """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
 
         Y depends on geometry, gravity and couplings, but not on masses: θ can be identified from measured torques,
         except for combinations that no motion distinguishes, for which Y is rank-deficient.
         [Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2]
         """
-        return self._answer("regressor", (q, v, a), out, errors)
+        return self._answer("regressor", (q, v, a), out)
 
     @query(4, 4, unit="1 and m", terms=_placement_terms)
-    def placement(self, q: ArrayLike, frame: str, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+    def placement(self, q: ArrayLike, frame: str, *, out: Answer | None = None) -> Answer:
         """Placement of a frame in the base: the homogeneous matrix [[R, p], [0, 1]]."""
-        return self._answer("placement", (q,), out, errors, (frame,))
+        return self._answer("placement", (q,), out, (frame,))
 
     @query(6, "n", unit="m/s and rad/s by v", terms=_jacobian_terms)
     def jacobian(
         self, q: ArrayLike, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, out: Answer | None = None,
-        errors: str = "raise",
     ) -> Answer:  # fmt: skip
         """Jacobian J(q) of a frame: twist = J v, (linear, angular)."""
-        return self._answer("jacobian", (q,), out, errors, (frame, expressed_in))
+        return self._answer("jacobian", (q,), out, (frame, expressed_in))
 
     @query(6, "n", unit="m/s² and rad/s² by v", terms=_jacobian_rate_terms)
     def jacobian_rate(
         self, q: ArrayLike, v: ArrayLike, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED,
-        out: Answer | None = None, errors: str = "raise",
+        out: Answer | None = None,
     ) -> Answer:  # fmt: skip
         """Rate of change dJ/dt of the Jacobian of a frame, along v."""
-        return self._answer("jacobian_rate", (q, v), out, errors, (frame, expressed_in))
+        return self._answer("jacobian_rate", (q, v), out, (frame, expressed_in))
 
-    def total_energy(self, q: ArrayLike, v: ArrayLike, *, errors: str = "raise") -> Any:
+    def total_energy(self, q: ArrayLike, v: ArrayLike) -> Any:
         """Return the total energy E = K + V, which is constant if only gravity acts.
 
         Args:
             q: Positions, shape (..., n), in [rad] or [m] by joint.
             v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN at states of a batch without a result.
 
         Returns:
             Energy, shape (...), in [J].
         """
-        return self.kinetic_energy(q, v, errors=errors) + self.potential_energy(q, errors=errors)
+        return self.kinetic_energy(q, v) + self.potential_energy(q)
+
+
+@dataclass(frozen=True)
+class NanRows(Dynamics[Answer]):
+    """The queries of an engine, with NaN for states without a result; see `Dynamics.nan_rows`."""
+
+    engine: Dynamics[Answer]
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.engine.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self.engine.joint_names
+
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = True
+    ) -> Any:
+        return self.engine._answer(name, state, out, frame, nan=True)
 
 
 QUANTITIES = table(Dynamics)

@@ -30,7 +30,6 @@ _PARAMETERS = {
         "body" (along the frame's axes) or "world" (at the base's origin); or Pinocchio's names "local_world_aligned",
         "local", "world".""",
     "out": "Array that receives the result and is returned; it is unchanged if the query raises.",
-    "errors": '"raise", or "nan" for NaN at states of a batch without a result.',
 }
 
 

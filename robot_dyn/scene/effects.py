@@ -128,17 +128,19 @@ class Armature(Edit):
 
     kind: Literal["armature"]
     inertia_kg_m2: Stated
-    """Inertia by joint, of the rotor if there is a gear; "urdf" for the values in an MJCF file, after gears."""
+    """Inertia by joint, of the rotor if there is a gear; "urdf" for the values of the file, after gears."""
     gear_ratio: PerJoint = 1.0
     """n: n² times the inertia of the rotor acts at the joint; joints left out have 1."""
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
-        stated = dict(loaded.edits.armature)
         if self.inertia_kg_m2 == URDF:
-            if not stated:
+            stated = dict(loaded.edits.armature)  # of an MJCF file
+            if not stated and not loaded.stated_armature.any():
                 raise SceneError("inertia_kg_m2: the robot's file states no armature; give it by joint")
             if "gear_ratio" in self.model_fields_set:
                 raise SceneError("gear_ratio: the armature of a file already includes gears; remove gear_ratio")
+            if not stated:
+                return robot.with_(armature=URDF)
             return robot.with_(armature={name: stated.get(name, 0.0) for name in robot.joint_names})
         inertia = per_joint("armature", self.inertia_kg_m2, robot)
         return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)

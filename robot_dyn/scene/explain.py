@@ -116,7 +116,7 @@ def _method(scene: Scene, setup: Setup) -> Iterator[str]:
     if scene.accuracy is not None:
         method, used = f"chosen for an error of q of at most {scene.accuracy:g}", ("accuracy",)
     yield f"method: {method}, {scene.duration_s:g} s"
-    for key in (*used, "record_period_s", "estimate_error", "engine"):
+    for key in (*used, "record_every_s", "estimate_error", "engine"):
         note = shortened(setup) if key == "step_s" else ""
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)}){note}"
     yield "start:"
@@ -125,11 +125,11 @@ def _method(scene: Scene, setup: Setup) -> Iterator[str]:
 
 def _machine_code(plant: Plant, setup: Setup | None) -> Iterator[str]:
     """Yield lines on the instructions of the compiled right-hand side, by effect."""
-    from robot_dyn.codegen.plant import Compiled
+    from robot_dyn.codegen.plant import compiled
 
     try:
-        compiled: Any = Compiled(StateEquation(plant, None).in_a_mode.plant)
-        by_effect, trace = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
+        machine_code = compiled(StateEquation(plant, None).in_a_mode.plant)
+        by_effect, trace = machine_code.instructions_by_effect, machine_code.engine.traces["forward_dynamics"]
     except RobotDynError as error:
         yield f"machine code: none, {error}"
         return

@@ -51,7 +51,7 @@ def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str])
         if len(path) > 1:
             start = kinds[int(path[1])]
             place = f"effect {int(path[1]) + 1} ({start})"
-        message = re.sub("integrator='(.+?)'", r'method = "\1"', str(error).removeprefix(f"{start}: "))
+        message = re.sub("method='(.+?)'", r'method = "\1"', str(error).removeprefix(f"{start}: "))
         named = SceneError(f"{place}: {message}")
         vars(named)["part"] = path
         raise named from None

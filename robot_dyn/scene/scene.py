@@ -16,7 +16,7 @@ from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import RobotDynError, SceneError, nearest, shorten, shown
 from robot_dyn.foundations.files import FileKind, read
-from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
+from robot_dyn.integrate.adaptive import ADAPTIVE, AUTO, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
@@ -31,7 +31,7 @@ from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 Factories = Mapping[str, Callable[..., Effect]]
 MAX_BYTES = 2**20
-_OF_SETUP = {"integrator": "method", "controller": "control", "period_s": "control", "q0": "start", "v0": "start"}
+_OF_SETUP = {"controller": "control", "period_s": "control", "q0": "start", "v0": "start"}
 SCENE = FileKind("a scene", ".toml")
 
 
@@ -83,8 +83,8 @@ class Scene(Part):
     """Options for reading the robot's file; unchanged by default."""
     duration_s: Positive
     """Length of the run."""
-    method: Annotated[str, AfterValidator(_known_method)] = Setup.integrator
-    """Integrator."""
+    method: Annotated[str, AfterValidator(_known_method)] = AUTO
+    """Integration method."""
     step_s: Positive = STEP_S
     """Step of a method with a fixed step; shorter where samples, ticks and switches require it."""
     rtol: Positive = Adaptive.rtol
@@ -93,7 +93,7 @@ class Scene(Part):
     """Absolute tolerance of an adaptive method, in rad and rad/s (m and m/s for a prismatic joint)."""
     accuracy: Positive | None = None
     """Largest error of q, in rad and m; pilot runs choose method and tolerance for it."""
-    record_period_s: NotNegative = 0.01
+    record_every_s: NotNegative = 0.01
     """Time between samples; 0 for every step."""
     estimate_error: Truth = Setup.estimate_error
     """True to repeat the run with longer steps, which estimates its error."""
@@ -178,17 +178,17 @@ class Scene(Part):
                 v0,
                 duration_s=self.duration_s,
                 controller=controller,
-                integrator=self.integrator(),
+                method=self.built_method(),
                 step_s=step_s,
-                record_period_s=self.record_period_s,
+                record_every_s=self.record_every_s,
                 estimate_error=self.estimate_error,
                 about=about,
                 engine=self.engine,
                 accuracy=self.accuracy,
             )
 
-    def integrator(self) -> Integrator | Adaptive:
-        """Return the integrator with the name `method`."""
+    def built_method(self) -> Integrator | Adaptive:
+        """Return the integration method with the name `method`, with the tolerances of the scene if it is adaptive."""
         if self.method in ADAPTIVE:
             return Adaptive(self.method, self.rtol, self.atol)
         return method(self.method)

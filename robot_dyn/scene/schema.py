@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchem
 from pydantic_core import PydanticCustomError, core_schema
 
 from robot_dyn.description.edits import by_joint
-from robot_dyn.foundations.coefficients import URDF
+from robot_dyn.foundations.coefficients import URDF, URDF_SOFT
 from robot_dyn.foundations.errors import nearest, shorten
 from robot_dyn.model.robot import Robot
 
@@ -97,14 +97,14 @@ Vector3 = Annotated[tuple[Number, Number, Number], Form("a list of 3 finite numb
 _BY_JOINT = "a finite number, a list of them or a table of them by joint"  # a joint left out of a table has 0
 PerJoint = Annotated[Number | list[Number] | dict[str, Number], Form(_BY_JOINT, "by joint")]
 Stated = Annotated[
-    Number | list[Number] | dict[str, Number] | Literal["urdf"],
+    Number | list[Number] | dict[str, Number] | Literal["urdf", "urdf_soft"],
     Form(f"{_BY_JOINT}, or 'urdf'", 'by joint or `"urdf"`'),
 ]
 
 
 def per_joint(key: str, value: Any, robot: Robot, elsewhere: float = 0.0) -> Any:
-    """Return a value for all joints, for each joint, or by name, as an array (n,); "urdf" is returned unchanged."""
-    if value == URDF:
-        return URDF
+    """Return a value for all joints, for each joint, or by name, as (n,); "urdf" and "urdf_soft" are unchanged."""
+    if value in (URDF, URDF_SOFT):
+        return value
     values = by_joint(key, value, robot.joint_names)
     return np.array([values.get(name, elsewhere) for name in robot.joint_names])

@@ -13,6 +13,8 @@ from robot_dyn.simulation.observation.remarks import RemarkKind as RemarkKind
 from robot_dyn.simulation.observation.remarks import remark_lines as remark_lines
 from robot_dyn.simulation.results.acting import at_stop as at_stop
 from robot_dyn.simulation.results.acting import wrenches as wrenches
+from robot_dyn.simulation.results.doubts import Doubt as Doubt
+from robot_dyn.simulation.results.doubts import DoubtKind as DoubtKind
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate as ErrorEstimate
 from robot_dyn.simulation.results.error_estimate import Verdict as Verdict
 from robot_dyn.simulation.results.ledger import Ledger as Ledger

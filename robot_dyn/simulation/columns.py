@@ -1,7 +1,7 @@
-"""Columns of a table: what each is of, its unit and its numbers; as a dictionary, a DataFrame and a Dataset.
+"""Columns of a table, with quantity, joint and unit, as a dictionary, a DataFrame and a Dataset.
 
-A heading is quantity, what it is of, and unit, as "q elbow_joint [rad]"; in a Dataset a quantity is over rows and
-joints.
+A heading is a quantity, its joint or effect, and its unit, for example "q elbow_joint [rad]". In a Dataset a quantity
+has the dimensions of rows and joints.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Column:
 
     Attributes:
         quantity: Such as "q".
-        values: Of each row.
-        unit: Empty if there is none.
-        of: Joint, effect or number of what it is a quantity; empty if there is but one.
+        values: Values by row.
+        unit: Unit; empty if there is none.
+        of: Joint, effect or number that the quantity belongs to; empty if it has one column only.
         title: The quantity in words.
-        over: Name of the axis that `of` is on, where that is not of joints.
+        over: Name of the axis of `of` if that is not the joints.
     """
 
     quantity: str
@@ -45,26 +45,26 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """Such as "q elbow_joint [rad]"."""
+        """Quantity, joint and unit, for example "q elbow_joint [rad]"."""
         return f"{self.quantity}{' ' * bool(self.of)}{self.of}" + f" [{self.unit}]" * bool(self.unit)
 
 
 def by_heading(columns: Iterable[Column]) -> dict[str, np.ndarray]:
-    """The columns as a dictionary.
+    """Return the columns as a dictionary.
 
     Raises:
-        QueryError: If two have one heading, so that one of them would be lost.
+        QueryError: If two have the same heading, so that one of them would be lost.
     """
     columns = list(columns)
-    table = {each.heading: each.values for each in columns}
-    for each in columns:
-        if table[each.heading] is not each.values:
-            raise QueryError(f"two columns would be named {shorten(each.heading)!r}; give effects other names")
+    table = {column.heading: column.values for column in columns}
+    for column in columns:
+        if table[column.heading] is not column.values:
+            raise QueryError(f"two columns would be named {shorten(column.heading)!r}; give effects other names")
     return table
 
 
 def data_frame(columns: Iterable[Column], attributes: Mapping[str, str]) -> Any:
-    """A `pandas.DataFrame` of the columns, with `attributes` as its `attrs`."""
+    """Return a `pandas.DataFrame` of the columns, with `attributes` as its `attrs`."""
     frame = needs("pandas", extra=EXTRA).DataFrame(by_heading(columns))
     frame.attrs |= attributes
     return frame
@@ -76,19 +76,19 @@ def data_set(
     attributes: Mapping[str, str],
     more: Mapping[str, Variable] | None = None,
 ) -> Any:
-    """An `xarray.Dataset`: a quantity of each joint is one variable over rows and joints.
+    """Return an `xarray.Dataset`: a quantity with a column for each joint is one variable over rows and joints.
 
     Args:
-        columns: The first names the rows, and is their coordinate.
-        joint_names: Of the coordinate `joint`.
-        attributes: Of the whole.
-        more: Variables beside the columns.
+        columns: Columns; the first one is the coordinate of the rows.
+        joint_names: Values of the coordinate `joint`.
+        attributes: Attributes of the Dataset.
+        more: Further variables.
     """
     columns = list(columns)
-    by_heading(columns)  # refuses what is named twice
+    by_heading(columns)  # raises an error for a name that occurs twice
     row, coordinates, variables = columns[0].quantity, {"joint": list(joint_names)}, dict(more or {})
-    for quantity, each in groupby(columns, lambda column: column.quantity):
-        group = list(each)
+    for quantity, grouped in groupby(columns, lambda column: column.quantity):
+        group = list(grouped)
         of, name = tuple(column.of for column in group), re.sub(r"[\s/]", "_", quantity)
         if name in variables:
             raise QueryError(f"two variables would be named {shorten(name)!r}; give effects other names")

@@ -1,4 +1,4 @@
-"""What follows from the record of a run: samples, energy ledger, deviation, loads, remarks; each when it is read."""
+"""Values derived from the record of a run on first access: samples, energy ledger, tracking error, loads, remarks."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from robot_dyn.simulation.diagnostics.damped_task import damped
 from robot_dyn.simulation.diagnostics.imbalance import cause
 from robot_dyn.simulation.diagnostics.runaway import runaway, step_too_long
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
+from robot_dyn.simulation.diagnostics.stiff_motion import limited_by_stability
 from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
@@ -26,7 +27,6 @@ from robot_dyn.simulation.results.provenance import edits_of_machine_code, origi
 from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
-from robot_dyn.simulation.run.stiffness import bounded_by_stability
 from robot_dyn.simulation.setup.setup import Setup
 
 
@@ -36,13 +36,13 @@ class Results:
     """The attributes of a `Trajectory` that are computed from the record of a run and values that do not change.
 
     Attributes:
-        setup: With the method of the run.
-        record: Of the run.
-        observer: Its observer, at its end.
-        error: Its estimated error.
+        setup: The setup, with the method of the run.
+        record: Recording of the run.
+        observer: Observer of the run, at its end.
+        error: Estimated error, or None.
         texts: Copy of the texts of the setup.
-        compiled: Whether machine code ran.
-        before: Remarks on runs before it.
+        compiled: True if machine code ran.
+        before: Remarks on runs that it replaced.
     """
 
     setup: Setup
@@ -57,11 +57,11 @@ class Results:
     u = property(attrgetter("_columns.u"))
     desired = property(attrgetter("_tracking.desired"))
     desired_velocity = property(attrgetter("_tracking.desired_velocity"))
-    deviation = property(attrgetter("_tracking.deviation"))
+    tracking_error = property(attrgetter("_tracking.tracking_error"))
 
     @cached_property
     def _columns(self) -> Columns:
-        return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
+        return columns(self.setup.equation, self.record.t, self.record.y, self.record.sampled)
 
     @cached_property
     def a(self) -> np.ndarray:
@@ -72,7 +72,7 @@ class Results:
 
     @property
     def _asks_plant(self) -> bool:
-        """Whether effects may be called again: of undeclared parts not after an interrupt, nor by the search."""
+        """True if effects may be called again: undeclared parts only with an error estimate and no interrupt."""
         again = self.setup.estimate_error and self.record.outcome.ending is not Ending.STOPPED
         return again or not self.setup.undeclared
 
@@ -82,16 +82,16 @@ class Results:
 
     @property
     def power(self) -> dict[str, np.ndarray]:
-        """Of each source, (m,), by name."""
+        """Power of each source, (m,), by name."""
         return dict(zip(self.setup.equation.sources, self._columns.power.T, strict=True))
 
     @cached_property
     def ledger(self) -> Ledger:
-        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be called."""
+        """Energy and work; with the cause if it does not close, unless undeclared parts must not be called."""
         energy = ledger(self.setup.equation, self.record)
-        explains = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
+        explains = self.setup.estimate_error or not self.setup.undeclared  # the search calls them 4000 times
         if explains and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
-            return replace(energy, cause=cause(self.setup, self.record, energy.closes))
+            return replace(energy, cause=cause(self.setup, self.record))
         return energy
 
     @cached_property
@@ -100,17 +100,16 @@ class Results:
 
     @property
     def outcome(self) -> Outcome:
-        """How it ended; if it diverged, with its loop as the reason where that explains it."""
+        """Reason and time of the end; if it diverged, its step or its loop is the reason if that explains it."""
         outcome = self.record.outcome
         return explained(outcome, self.setup, self._of_control) if outcome.ending is Ending.DIVERGED else outcome
 
     @property
     def about(self) -> dict[str, str]:
-        """Texts: where it comes from, its settings, what machine code changed, and those of the setup."""
+        """Texts: origin, settings, changes by machine code, and the texts of the setup."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
-        known = frame_of(self.setup) | rotors_of(self.setup) | settings_text(self.setup)
-        known |= origin(self.setup.plant.dynamics)
-        return known | edits | self.texts
+        texts = frame_of(self.setup) | rotors_of(self.setup) | settings_text(self.setup)
+        return texts | origin(self.setup.plant.dynamics) | edits | self.texts
 
     @property
     def wrenches(self) -> dict[str, np.ndarray]:
@@ -119,7 +118,7 @@ class Results:
 
     @property
     def at_stop(self) -> np.ndarray | None:
-        """Whether each joint is at or beyond a stop, (m, n)."""
+        """True where a joint is at or beyond a stop, (m, n); None without stops."""
         return at_stop(self.setup.plant, self.q)
 
     @cached_property
@@ -128,16 +127,16 @@ class Results:
 
     @property
     def extremes(self) -> np.ndarray:
-        """Of q, v and u over all steps, (3, 2, n)."""
+        """The least and the largest of q, v and u over all steps, (3, 2, n)."""
         return self._observed.extremes[0]
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """On what was observed, on runs before it, on its steps and on its control."""
+        """Remarks on observations, on runs that it replaced, on its steps and on its control."""
         observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
         return (
             *remarks(self.setup, self.observer, observed, self.record.t, samples, self.power), *self.before,
-            *bounded_by_stability(self.setup, self.record), *self._of_control,
+            *limited_by_stability(self.setup, self.record), *self._of_control,
         )  # fmt: skip
 
     @cached_property
@@ -146,29 +145,29 @@ class Results:
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
         runs_away = self.record.outcome.ending is Ending.DIVERGED or bool(runaway(self.setup, self.observer.fastest))
-        doubtful = runs_away or (self.error is not None and self.error.note)
+        doubtful = runs_away or (self.error is not None and self.error.ends_early)
         step = step_too_long(self.setup, self.record.outcome.t) if doubtful else ()
         loop = unstable(self.setup, self.record.t, self.record.y, runs_away, end=self.record.outcome.t)
         return (*step, *loop, *damped(self.setup, self.record))
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """Names of what acted."""
+        """Names of edits, effects and control."""
         return acting(self.setup)
 
     @property
     def controller_states(self) -> np.ndarray | None:
-        """Of the controller at the samples."""
+        """States of the controller at the samples."""
         return self.setup.equation.controller_states(self.record.y)
 
     @property
     def effect_states(self) -> dict[str, np.ndarray]:
-        """Of each effect with states at the samples."""
+        """States of each effect at the samples, by name."""
         return self.setup.equation.effect_states(self.record.y)
 
     @property
     def effect_torques(self) -> dict[str, np.ndarray] | None:
-        """What each effect exerted at the samples; None where effects are not to be called again."""
+        """Torque of each effect on the joints at the samples; None if effects must not be called again."""
         if not self._asks_plant:
             return None
         return effect_torques(self._plant, self.record.t, self._columns._replace(a=self.a), self.effect_states)

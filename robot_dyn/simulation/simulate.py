@@ -9,27 +9,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields, replace
 from time import perf_counter
-from typing import Any, NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack, cast
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
-from robot_dyn.integrate.time_stepping import TimeStepping
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
+from robot_dyn.integrate.time_stepping import MoreauJean
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.runaway import judged, runaway
+from robot_dyn.simulation.diagnostics.stiff_motion import replacement
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.estimate.requested_accuracy import trials
 from robot_dyn.simulation.observation.observer import Observer, observer_of
-from robot_dyn.simulation.observation.remarks import Remark, sentence
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import TOO_FAST, Accumulation, Ending, Outcome, Reason, Stiff, TooLong
+from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.runner import Runner
@@ -54,12 +56,13 @@ def simulate(
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
-        **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
-            record_period_s, estimate_error, about, engine, events and accuracy.
+        **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, method, step_s,
+            record_every_s, estimate_error, about, engine, events and accuracy. `rtol` and `atol` are the tolerances of
+            an adaptive method, 1e-10 and 1e-12 by default.
 
     Raises:
-        QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
-            reported by the trajectory's outcome.
+        QueryError: If the setup is not allowed, if a method of fixed step is given `rtol` or `atol`, or if the record
+            would not fit into memory. The trajectory's outcome reports what happens during the run.
         AccuracyError: If the requested accuracy cannot be reached.
     """
     function("on_progress", on_progress, "the time reached")
@@ -94,10 +97,10 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         "error": error,
         "accuracy": None,
     }
-    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # nothing may be read later
+    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # later reads are not allowed
         later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
         known |= {name: getattr(results, name) for name in later}
-    method = ran.setup.integrator
+    method = ran.setup.method
     statistics = Statistics(
         method=EXPLICIT if method.name == AUTO else method.name,
         step_s=0.0 if method.controls_error else recording.outcome.t / max(recording.steps, 1),
@@ -139,7 +142,7 @@ class _Ran(NamedTuple):
 
 def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
     """Run a setup; restart with another engine or method if it turns out to be better suited."""
-    seen, remarks, may_replace = 0, (), setup.integrator.name == AUTO
+    seen, remarks, may_replace = 0, (), setup.method.name == AUTO
     while True:
         engine, observer = choose(setup, seen), observer_of(setup)
         run = Run(
@@ -153,10 +156,9 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
         match run.run():
             case TooLong(evaluations):
                 seen = evaluations
-            case Stiff(remark):
-                setup, may_replace, remarks = cached(setup, with_stiff_method), False, (remark,)
-            case Accumulation(remark):
-                setup, may_replace, remarks = cached(setup, with_time_stepping), False, (*remarks, remark)
+            case Stiff() | Accumulation() as given_up:
+                other = with_stiff_method if isinstance(given_up, Stiff) else with_time_stepping
+                setup, may_replace, remarks = cached(setup, other), False, (*remarks, replacement(given_up))
             case recording:
                 observer.end()
                 if too_fast := runaway(setup, observer.fastest):
@@ -166,12 +168,12 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
 
 def with_stiff_method(setup: Setup) -> Setup:
     """Return the setup by the stiff method with the same tolerances."""
-    return replace(setup, integrator=replace(setup.integrator, method=STIFF))
+    return replace(setup, method=replace(cast(Adaptive, setup.method), method=STIFF))
 
 
 def with_time_stepping(setup: Setup) -> Setup:
     """Return the setup by time stepping."""
-    return replace(setup, integrator=TimeStepping())
+    return replace(setup, method=MoreauJean())
 
 
 def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | None]:
@@ -180,10 +182,10 @@ def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | No
     if not setup.estimate_error or recording.outcome.ending is Ending.STOPPED:
         return recording, None
     if ran.runaway:
-        return recording, no_estimate(sentence(TOO_FAST, ran.runaway))
+        return recording, no_estimate(Doubt(DoubtKind.IMPLAUSIBLE_SPEED, ran.runaway))
     try:
         return recording, estimate(setup, recording, runner)
     except KeyboardInterrupt:
         if recording.outcome.ending is Ending.FINISHED:
             recording = replace(recording, outcome=Outcome(Reason.INTERRUPTED_IN_ESTIMATE, recording.outcome.t))
-        return recording, no_estimate("it was interrupted")
+        return recording, no_estimate(Doubt(DoubtKind.INTERRUPTED))

@@ -68,10 +68,10 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
         dotted = ", desired dotted" if desired else ""
         limits = _limits(robot.joint_names, lower, upper, actual)
         found.append(_plot(title + dotted, unit(symbol, kind), actual + desired) | limits)
-    if any(run.deviation is not None for run in runs):
+    if any(run.tracking_error is not None for run in runs):
         of_frame = all(run.desired is None for run in runs)
-        title, of = ("tracking error p − p_d", "m") if of_frame else ("tracking error q − q_d", unit("q", kind))
-        found.append(_plot(title, of, curves(_deviation(run) for run in runs)))
+        title, of = ("tracking error p_d − p", "m") if of_frame else ("tracking error q_d − q", unit("q", kind))
+        found.append(_plot(title, of, curves(_tracking_error(run) for run in runs)))
     for run, name in zip(runs[1:], names[1:], strict=True):
         if comparable(first, run):
             found.append(_difference(first, run, names[0], name, unit("q", kind)))
@@ -105,11 +105,11 @@ def _desired(run: TrajectoryData, first: TrajectoryData, field: str) -> Columns:
     return {} if x is None or again else _by_joint(run, x)
 
 
-def _deviation(run: TrajectoryData) -> Columns:
-    if run.deviation is None:
+def _tracking_error(run: TrajectoryData) -> Columns:
+    if run.tracking_error is None:
         return {}
     names = run.joint_names if run.desired is not None else [f"frame, {axis}" for axis in "xyz"]
-    return dict(zip(names, run.deviation.T, strict=True))
+    return dict(zip(names, run.tracking_error.T, strict=True))
 
 
 def _energy(run: TrajectoryData) -> Columns:

@@ -11,7 +11,7 @@ import robot_dyn as rd
 from benchmarks.measure import Effort, row, table
 
 STEP_S = 5e-3
-METHODS = ("gauss_4", "rk4", "explicit_euler")
+METHODS = ("GaussLegendre4", "RK4", "Euler")
 
 
 def energy(effort: Effort) -> None:
@@ -22,7 +22,7 @@ def energy(effort: Effort) -> None:
     for name in METHODS:
         run = rd.simulate(
             rd.load("planar_2r"), q0=[-1.0, 0.5], v0=[0.3, -0.2], duration_s=steps * STEP_S, step_s=STEP_S,
-            integrator=name, record_period_s=max(1, steps // 20000) * STEP_S, estimate_error=False,
+            method=name, record_every_s=max(1, steps // 20000) * STEP_S, estimate_error=False,
         )  # fmt: skip
         residual = run.ledger.residual
         known = np.isfinite(residual)

@@ -17,7 +17,7 @@ TIGHT = rd.integrate.Adaptive(rtol=1e-13, atol=1e-14)
 
 def scenes() -> dict[str, rd.Setup]:
     """Five smooth scenes, for RK4."""
-    panda, double, rk4 = arms()["Panda-7"], rd.load("planar_2r"), rd.integrate.method("rk4")
+    panda, double, rk4 = arms()["Panda-7"], rd.load("planar_2r"), rd.integrate.method("RK4")
     reach = rd.control.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
     control = rd.control.ComputedTorque(panda, reach, *rd.control.gains_from(1.0, 8.0, 0.9))
     friction, spring = rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([30.0, 0.0], [0.2, 0.0])
@@ -40,8 +40,8 @@ def estimates(effort: Effort) -> None:
     for name, full in scenes().items():
         setup = replace(full, duration_s=0.4) if effort.quick else full
         run, h = rd.simulate(setup), setup.nominal_step_s
-        exact = rd.simulate(setup, integrator="order_8", step_s=h / 2, record_period_s=h, estimate_error=False)
-        tight = rd.simulate(setup, integrator=TIGHT, estimate_error=False)
+        exact = rd.simulate(setup, method="DP8", step_s=h / 2, record_every_s=h, estimate_error=False)
+        tight = rd.simulate(setup, method=TIGHT, estimate_error=False)
         error, doubt = np.abs(run.q - exact.q).max(), np.abs(tight.q[-1] - exact.q[-1]).max()
         assert run.error is not None
         largest = run.error.largest

@@ -25,15 +25,15 @@ print(time.process_time() - began)
 _SCENES = {
     "RK4, PD and viscous friction": (
         "rd.Plant(arm, [rd.effects.ViscousFriction(0.5)])",
-        "controller=rd.control.PD(rd.control.hold(q), 80.0, 8.0), integrator='rk4'",
+        "controller=rd.control.PD(rd.control.hold(q), 80.0, 8.0), method='RK4'",
     ),
     "DOP853, joint stops": (
         "rd.Plant(arm, rd.effects.joint_stops([x - 0.3 for x in q], [x + 0.3 for x in q], 1e4, 10.0))",
-        "integrator=rd.integrate.Adaptive(method='DOP853')",
+        "method=rd.integrate.Adaptive(method='DOP853')",
     ),
-    "Rosenbrock, stiff friction": (
+    "Rodas5P, stiff friction": (
         "rd.Plant(arm, [rd.effects.RegularisedCoulombFriction(2.0, 1e-3), rd.effects.ViscousFriction(500.0)])",
-        "integrator=rd.integrate.Adaptive(method='Rosenbrock')",
+        "method=rd.integrate.Adaptive(method='Rodas5P')",
     ),
 }  # fmt: skip
 

@@ -44,7 +44,7 @@ def growth(effort: Effort) -> None:
             file = Path(folder) / "chain.urdf"
             file.write_text(chain(n))
             robot = rd.load(file)
-        ours: Any = rd.Compiled(robot, cache=False)
+        ours: Any = rd.compiled(robot, cache=False)
         batch, out = np.random.default_rng(1).normal(size=(3, BATCH, n)), np.empty((BATCH, n))
         first = seconds(lambda: ours.forward_dynamics(*batch, out=out))
         pool, columns = pin.ModelPool(robot.model, 1), [np.asfortranarray(x.T) for x in batch]
@@ -88,7 +88,7 @@ def draw(found: np.ndarray, picture: Path) -> None:
 _MEMORY = """
 import resource, sys, numpy as np, robot_dyn as rd
 arm, states = rd.load("ur5"), int(sys.argv[1])
-ours, batch, out = rd.Compiled(arm), np.random.default_rng(1).normal(size=(3, states, 6)), np.empty((states, 6))
+ours, batch, out = rd.compiled(arm), np.random.default_rng(1).normal(size=(3, states, 6)), np.empty((states, 6))
 ours.forward_dynamics(*(x[:4096] for x in batch), out=out[:4096])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 ours.forward_dynamics(*batch, out=out)

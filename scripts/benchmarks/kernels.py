@@ -75,7 +75,7 @@ def kernels(effort: Effort) -> None:
     for arm, robot in arms().items():
         batch = np.random.default_rng(1).normal(size=(3, BATCH, robot.n))
         for name, cpp in in_cpp(robot, batch).items():
-            ours, single = rd.Compiled(robot), rd.Compiled(robot, dtype="float32")
+            ours, single = rd.compiled(robot), rd.compiled(robot, dtype="float32")
             arguments = tuple(batch[: 1 if name == "M" else 3])
             loop = looped(ours.engine.kernels[name].state, len(arguments))
             y = np.empty((BATCH, *ours.engine.shape(name)))
@@ -99,7 +99,7 @@ def from_python(effort: Effort) -> None:
     table("arm", "query", "pin, µs", "compiled, µs", "ratio", "with out=, µs", "ratio")
     for arm, robot in arms().items():
         q, v, a = np.random.default_rng(1).normal(size=(3, robot.n))
-        ours, model, out = rd.Compiled(robot), robot.model, np.empty(robot.n)
+        ours, model, out = rd.compiled(robot), robot.model, np.empty(robot.n)
         data = model.createData()
         for name, bare in (("forward_dynamics", pin.aba), ("inverse_dynamics", pin.rnea)):
             query = getattr(ours, name)
@@ -117,7 +117,7 @@ def threads(effort: Effort) -> None:
     """Two threads against one, in batches of forward dynamics; of a small one a single thread serves both."""
     table("arm", "states", "1 thread, µs per state", "2 threads", "ratio")
     for arm, robot in arms().items():
-        one, two = rd.Compiled(robot, threads=1), rd.Compiled(robot, threads=2)
+        one, two = rd.compiled(robot, threads=1), rd.compiled(robot, threads=2)
         for states in (BATCH, 8 * BATCH, (16 if effort.quick else 64) * BATCH):
             batch, out = np.random.default_rng(1).normal(size=(3, states, robot.n)), np.empty((states, robot.n))
             sides = {
@@ -135,7 +135,7 @@ arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 q = np.linspace(-0.5, 0.6, 7)
 arm.forward_dynamics(q, q, q)
 began = time.perf_counter()
-rd.Compiled(arm).forward_dynamics(q, q, q)
+rd.compiled(arm).forward_dynamics(q, q, q)
 print(time.perf_counter() - began)
 """
 

@@ -27,7 +27,7 @@ LEVELS, EVENTS = (0.5, 0.9, 0.99), (0.01, 0.1)
 SCENE = f"""
 robot = "pendulum"
 duration_s = {T}
-method = "rk4"
+method = "RK4"
 step_s = 0.0025
 start = {{q = {{pivot = 1.0}}}}
 effect = [{{kind = "gravity"}}]

@@ -110,7 +110,7 @@ def _judged(plant: rd.Plant, points: np.ndarray) -> tuple[float, ...]:
     found = rd.tools.motors.path(plant, points)
     seconds = perf_counter() - began
     q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
-    torque = np.abs(robot.inverse_dynamics(q, v, a) - plant.torque(0.0, q, v)) / robot.effort_limit
+    torque = np.abs(robot.inverse_dynamics(q, v, a) - plant.torque(q, v, t=0.0)) / robot.effort_limit
     speed = np.abs(v) / robot.velocity_limit
     at_limit = (np.maximum(torque.max(axis=1), speed.max(axis=1)) >= 0.99).mean()
     return torque.max(), speed.max(), at_limit, found.elsewhere.get("no reason known", 0.0), seconds

@@ -19,7 +19,7 @@ TARGETS = (1e-6, 1e-8, 1e-10)
 def precision(effort: Effort) -> None:
     """A table of the time that each takes to an error, and the diagram of all."""
     setup = rd.Setup(rd.Plant(arms()["Panda-7"]), READY, engine="compiled", estimate_error=False)
-    quick: Any = {"methods": ["DOP853", "rk4"], "budget_s": 2.0, "repeats": 1} if effort.quick else {"budget_s": 120.0}
+    quick: Any = {"methods": ["DOP853", "RK4"], "budget_s": 2.0, "repeats": 1} if effort.quick else {"budget_s": 120.0}
     result = rd.accuracy.work_precision(setup, **quick)
     table("what", *(f"to {x:g}, ms" for x in TARGETS), *(f"over DOP853, {x:g}" for x in TARGETS))
     base = [result.ladders[0].price(x) for x in TARGETS]
@@ -43,7 +43,7 @@ def whole(setup: rd.Setup, effort: Effort) -> list[float]:
     found = []
     for target in TARGETS:
         with_method = replace(
-            setup, integrator=rd.integrate.Adaptive(rtol=target / 10, atol=target / 10), record_period_s=1.0
+            setup, method=rd.integrate.Adaptive(rtol=target / 10, atol=target / 10), record_every_s=1.0
         )
         times = [seconds(lambda: rd.simulate(with_method)) for _ in range(effort.repeats + 1)]
         found.append(median(times[1:]))

@@ -35,8 +35,8 @@ def one_step(effort: Effort) -> None:
     model: Any = mujoco_model(mujoco, panda, bare=True)
     duration = steps * STEP_S
     setup = rd.Setup(
-        rd.Plant(panda), READY, duration_s=duration, record_period_s=duration, estimate_error=False,
-        engine="compiled", integrator="rk4",
+        rd.Plant(panda), READY, duration_s=duration, record_every_s=duration, estimate_error=False,
+        engine="compiled", method="RK4",
     )  # fmt: skip
     theirs, ours = [], []
     rd.simulate(setup)
@@ -59,7 +59,7 @@ def one_step(effort: Effort) -> None:
 def thousands(effort: Effort) -> None:
     """Runs of 1000 RK4 steps under PD and viscous friction on 2 threads; every q and v is recorded on both sides."""
     model: Any = mujoco_model(mujoco, arms()["Panda-7"], GAINS, DAMPING, bare=True)
-    _side_by_side(effort, model, [], "rk4", "RK4 steps, PD and friction")
+    _side_by_side(effort, model, [], "RK4", "RK4 steps, PD and friction")
 
 
 def sticking(effort: Effort) -> None:
@@ -67,7 +67,7 @@ def sticking(effort: Effort) -> None:
     model: Any = mujoco_model(mujoco, arms()["Panda-7"], GAINS, DAMPING)
     stick_and_stop(mujoco, model, LEVEL, LOWER, UPPER, STEP_S)
     held = [rd.effects.DryFriction(LEVEL), rd.effects.RigidStops(LOWER, UPPER)]
-    _side_by_side(effort, model, held, "time_stepping", "steps, PD, dry friction and rigid stops")
+    _side_by_side(effort, model, held, "MoreauJean", "steps, PD, dry friction and rigid stops")
 
 
 def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what: str) -> None:
@@ -75,7 +75,7 @@ def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what
     goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).uniform(-1, 1, size=(runs, 7))
     control = rd.control.PD(rd.control.hold(goal), *GAINS)
     plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), *held])
-    setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, integrator=method)
+    setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, method=method)
     first = np.zeros((runs, 1 + 14))
     first[:, 1:8] = starts
     command, state = np.broadcast_to(goal, (runs, steps, 7)).copy(), np.empty((runs, steps, 15))

@@ -2,7 +2,7 @@
 
 distance = the largest |q(t) − q_limit(t)| over joints and samples each 8 ms in 2 s
 
-Beside `time_stepping`, MuJoCo with frictionloss and limits: at its default settings, and at its stiffest, solref
+Beside `MoreauJean`, MuJoCo with frictionloss and limits: at its default settings, and at its stiffest, solref
 (2 h, 1) and solimp 0.9999, which shrink with the step h. Drake has no dry friction of joints to compare with.
 """
 
@@ -37,19 +37,17 @@ def sticking(effort: Effort) -> None:
     for what, stops in (("dry friction", []), ("dry friction and stops, e = 0", [rd.effects.RigidStops(LOWER, UPPER)])):
         plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), rd.effects.DryFriction(LEVELS), *stops])
         options: dict[str, Any] = {
-            "q0": START, "duration_s": DURATION_S, "controller": drive, "record_period_s": SAMPLE_S,
+            "q0": START, "duration_s": DURATION_S, "controller": drive, "record_every_s": SAMPLE_S,
             "estimate_error": False,
         }  # fmt: skip
-        limit = rd.simulate(
-            plant, **options, engine="compiled", integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
-        )
+        limit = rd.simulate(plant, **options, engine="compiled", method=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12))
         print(f"\n{what}: {len(limit.events)} events")
         table("h, s", *(f"{h:g}" for h in steps), "mean order")
 
         def ours(h: float, plant: rd.Plant = plant, options: dict[str, Any] = options) -> np.ndarray:
-            return rd.simulate(plant, **options, integrator="time_stepping", step_s=h).q
+            return rd.simulate(plant, **options, method="MoreauJean", step_s=h).q
 
-        _distances("time_stepping", ours, steps, limit.q)
+        _distances("MoreauJean", ours, steps, limit.q)
         for name, stiff in (("MuJoCo, stiffest", True), ("MuJoCo, default", False)):
             _distances(name, lambda h, stiff=stiff: _mujoco(panda, drive, h, stiff, bool(stops)), steps, limit.q)
 

@@ -23,18 +23,18 @@ Texts = dict[str, Any]
 
 CACHE_VARIABLE = "ROBOT_DYN_CACHE"  # names the folder of compiled code
 METHODS = {
-    "Euler": "explicit_euler",
-    "semi-implicit Euler": "semi_implicit_euler",
-    "midpoint": "midpoint",
-    "RK4": "rk4",
-    "order 8": "order_8",
-    "Gauss 2": "gauss_2",
-    "Gauss 4": "gauss_4",
-    "Gauss 6": "gauss_6",
-    "Rosenbrock, fixed step": "rosenbrock_5",
-    "time stepping": "time_stepping",
+    "Euler": "Euler",
+    "semi-implicit Euler": "SemiImplicitEuler",
+    "Midpoint": "Midpoint",
+    "RK4": "RK4",
+    "order 8": "DP8",
+    "Gauss 2": "GaussLegendre2",
+    "Gauss 4": "GaussLegendre4",
+    "Gauss 6": "GaussLegendre6",
+    "Rosenbrock, fixed step": "Rodas5PFixed",
+    "time stepping": "MoreauJean",
     "DOP853": "DOP853",
-    "Rosenbrock": "Rosenbrock",
+    "Rodas5P": "Rodas5P",
     "automatic": "auto",
 }
 
@@ -67,7 +67,7 @@ def own_lagrangian(robot: Any) -> Any:
 
 def compiled(robot: Any) -> Any:
     """Return the machine code of a robot or plant, on one thread."""
-    return rd.Compiled(robot, threads=1)
+    return rd.compiled(robot, threads=1)
 
 
 def pinocchio_model(robot: Any) -> Any:
@@ -189,9 +189,9 @@ def setup(
     accuracy: float | None = None,
 ) -> Any:
     """Return the setup of a run; `engine` is "compiled", "interpreted" or "auto"."""
-    options = {"integrator": by} if by is not None else {}
+    options = {"method": by} if by is not None else {}
     return rd.Setup(
-        plant, q0, v0, duration, controller=controller, step_s=step, record_period_s=record, estimate_error=estimate,
+        plant, q0, v0, duration, controller=controller, step_s=step, record_every_s=record, estimate_error=estimate,
         engine=engine, events=events, accuracy=accuracy, **options,
     )  # fmt: skip
 
@@ -217,7 +217,7 @@ def run_values(run: Any) -> tuple[Values, Texts]:
     values |= {f"torque of {name}": x for name, x in sorted((run.effect_torques or {}).items())}
     optional = {
         "reference": run.desired,
-        "deviation": run.deviation,
+        "deviation": None if run.tracking_error is None else -run.tracking_error,  # the name and sign in stored results
         "state of the controller": run.controller_states,
         "extremes": run.extremes,
     }
@@ -259,8 +259,8 @@ def rollouts_values(runs: Any) -> tuple[Values, Texts]:
     values = {name: getattr(runs, name) for name in ("t", "q", "v", "u", "kinetic", "potential")}
     values |= {f"work of {name}": x for name, x in sorted((runs.work or {}).items())}
     values |= {"end": runs.ended}
-    if runs.tracking_error is not None:
-        values["tracking error"] = runs.tracking_error
+    if runs.rms_tracking_error is not None:
+        values["tracking error"] = runs.rms_tracking_error
     remarks = sorted((str(x.kind), x.joint, x.quantity, sorted(x.runs)) for x in runs.remarks)
     texts = {
         "diverged": runs.diverged.tolist(),
@@ -302,7 +302,7 @@ DISTRIBUTIONS = SimpleNamespace(
     choice=lambda values: _sw.choice(values),
 )
 FIGURES = SimpleNamespace(
-    rms_error=lambda joint=None: _sw.rms_error(joint),
+    rms_tracking_error=lambda joint=None: _sw.rms_tracking_error(joint),
     peak=lambda of, joint=None: _sw.peak(of, joint),
     final=lambda of, joint=None: _sw.final(of, joint),
 )

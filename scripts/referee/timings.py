@@ -168,8 +168,8 @@ def in_process() -> Iterator[tuple[str, Prepare]]:
     yield "simulate, RK4 interpreted", partial(simulated, lambda: under_pd(by("RK4"), 5e-3, engine="interpreted"))
     yield "simulate, DOP853", partial(simulated, lambda: under_pd(by("DOP853", 1e-8), None))
     yield (
-        "simulate, Rosenbrock",
-        partial(simulated, lambda: swing([FX.regularised_coulomb(2.0, 1e-3)], by("Rosenbrock", 1e-8))),
+        "simulate, Rodas5P",
+        partial(simulated, lambda: swing([FX.regularised_coulomb(2.0, 1e-3)], by("Rodas5P", 1e-8))),
     )
     yield "simulate, Gauss 4", partial(simulated, lambda: under_pd(by("Gauss 4"), 5e-3))
     yield "simulate, time stepping", partial(simulated, lambda: swing(stops(), by("time stepping"), 1e-3))

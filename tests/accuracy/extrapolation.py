@@ -38,7 +38,7 @@ def motion(
 
         def rate(t: Any, y: np.ndarray) -> np.ndarray:
             u = np.zeros(n) if control is None else control(t, y[:n], y[n:])
-            return middle(np.concatenate([y[n:], plant.forward_dynamics(float(t), y[:n], y[n:], u)]))
+            return middle(np.concatenate([y[n:], plant.forward_dynamics(y[:n], y[n:], u, t=float(t))]))
 
         y, h = middle(np.array([arb(x) for x in (*q, *v)], dtype=object)), arb(until_s) / steps
         for k in range(steps):

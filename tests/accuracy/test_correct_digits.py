@@ -166,7 +166,7 @@ def test_a_nearly_singular_robot_warns_exactly_where_an_answer_has_fewer_than_8_
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # states without an answer have no digits
         assert robot.forward_dynamics(np.zeros((0, robot.n)), v[0], tau[0]).shape == (0, robot.n)
-        assert np.isnan(robot.forward_dynamics([q[0] * np.nan], v[0], tau[0], errors="nan")).all()
+        assert np.isnan(robot.nan_rows.forward_dynamics([q[0] * np.nan], v[0], tau[0])).all()
 
 
 def test_any_function_can_check_the_answers_of_a_robot() -> None:
@@ -211,7 +211,7 @@ def test_states_without_an_answer_are_not_warned_of() -> None:
     robot = rd.accuracy.warn_below(rd.load("planar_2r"), 12)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        answers = robot.N([[0.3, np.nan], [0.3, 0.4]], errors="nan")
+        answers = robot.nan_rows.N([[0.3, np.nan], [0.3, 0.4]])
         assert robot.N(np.zeros((0, 2))).shape == (0, 2)
     assert np.isnan(answers[0]).all() and np.isfinite(answers[1]).all()
 

@@ -41,7 +41,7 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 
 def compiled(of: rd.Setup) -> dict[str, int]:
     """Instructions of the programs that `simulate` runs, by name."""
-    made = machine_code(StateEquation(of.plant, of.controller), rd.integrate.method("rk4"))
+    made = machine_code(StateEquation(of.plant, of.controller), rd.integrate.method("RK4"))
     return {name: len(program) for name, program in made.code.programs.items()}
 
 
@@ -100,7 +100,7 @@ def test_algorithms_are_counted_from_the_kernels_of_compiled() -> None:
     """The least of each formulation is that of the kernel of the same query."""
     arm = rd.load("ur5")
     pairs = {name: make() for name, make in QueryCost(arm).pairs()}
-    own: Any = rd.Compiled(arm)
+    own: Any = rd.compiled(arm)
     count = {name: len(own.engine.kernels[name].program) for name in ("C", "coriolis_torque", "forward_dynamics")}
     derivatives = len(own.engine.kernels["forward_dynamics_derivatives"].program)
     matrix = pairs["Coriolis matrix"]
@@ -133,11 +133,11 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
     for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, -3.7)):
         plant = rd.Plant(ARM.with_(gravity=gravity), [FRICTION])
         equation = StateEquation(plant, None)
-        made = machine_code_of_constants(equation, rd.integrate.method("rk4"))
+        made = machine_code_of_constants(equation, rd.integrate.method("RK4"))
         assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
         y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
         made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)
-        theirs = plant.forward_dynamics(0.0, Q, V, np.zeros(2))
+        theirs = plant.forward_dynamics(Q, V, np.zeros(2), t=0.0)
         np.testing.assert_allclose(out[2:4, 0], theirs, rtol=1e-12)
 
 

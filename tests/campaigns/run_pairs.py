@@ -75,7 +75,7 @@ def one_motion(seed: int, index: int) -> Pair | None:
     """A scene, recorded at two periods; None if its error is not estimated."""
     scene = scene_of_a_pair(seed, index)
     both = periods(seed, index, scene.setup.duration_s)
-    a, b = (rd.simulate(replace(scene.setup, record_period_s=h)) for h in both)
+    a, b = (rd.simulate(replace(scene.setup, record_every_s=h)) for h in both)
     return None if not (_estimated(a) and _estimated(b)) else _compared(scene, a, b, both, 0.0)
 
 
@@ -87,7 +87,7 @@ def two_motions(seed: int, index: int, at_one_period: bool = True) -> Pair | Non
     scene = scene_of_a_pair(seed, index)
     way = np.random.default_rng([seed, index, 29]).normal(size=len(scene.setup.q0))
     both = periods(seed, index, scene.setup.duration_s)
-    recorded = replace(scene.setup, record_period_s=both[0])
+    recorded = replace(scene.setup, record_every_s=both[0])
     a = rd.simulate(recorded)
     if not _estimated(a):
         return None
@@ -100,7 +100,7 @@ def two_motions(seed: int, index: int, at_one_period: bool = True) -> Pair | Non
             return None
         if abs(apart / aim - 1) < NEAR:
             seconds = both if not at_one_period else (both[0], both[0])
-            b = rd.simulate(replace(moved, record_period_s=seconds[1]))
+            b = rd.simulate(replace(moved, record_every_s=seconds[1]))
             if not _estimated(b):
                 return None
             assert b.error is not None

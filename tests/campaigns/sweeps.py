@@ -24,7 +24,7 @@ SCENES = {
     "PD": SCENE,
     "noise": SCENE.replace('kind = "pd"\n', 'kind = "pd"\nperiod_s = 0.005\n') + NOISE,
     "stops": SCENE.replace("[control]", STOPS + "[control]"),
-    "chosen steps": SCENE.replace('method = "rk4"\nstep_s = 0.001\n', ""),
+    "chosen steps": SCENE.replace('method = "RK4"\nstep_s = 0.001\n', ""),
 }
 ROWS_OF_A_SWEEP = 20
 

@@ -201,7 +201,7 @@ def test_a_scene_is_asked_at_its_start_for_what_is_held_and_how_firmly(tmp_path:
     text = said("query", scene, "--why", "joint_2")
     assert re.search(r"^joint_2 +dry_friction +-\d\S+ +-20 +20 ", text, re.M)
     assert re.search(r"^dry friction and stops, at rest ", text, re.M)
-    assert [(each.joint, each.load) for each in setup.plant.held(0.0, setup.q0, setup.v0, u)] == [
+    assert [(each.joint, each.load) for each in setup.plant.held(setup.q0, setup.v0, u, t=0.0)] == [
         ("joint_1", one["load"]), ("joint_2", two["load"])
     ]  # fmt: skip
 
@@ -277,7 +277,7 @@ def test_info_names_the_formulation_of_the_fewest_instructions() -> None:
 
 def test_the_cache_is_listed_and_cleared(folder: Path) -> None:
     assert "0 kernels" in said("cache")
-    rd.Compiled(rd.load("pendulum")).M(np.array([0.3]))
+    rd.compiled(rd.load("pendulum")).M(np.array([0.3]))
     listed = document("cache")
     assert (listed["folder"], len(listed["kernels"])) == (str(folder), 1)
     assert listed["bytes"] == listed["kernels"][0]["size"] > 1000

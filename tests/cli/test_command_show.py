@@ -79,7 +79,7 @@ def test_help_names_every_plot() -> None:
 @pytest.fixture
 def files(tmp_path: Path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, integrator="rk4")
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="RK4")
     rd.simulate(setup).save("run.npz")
     rd.rollouts(setup, [[0.1], [0.2]]).save("runs.npz")
     return tmp_path

@@ -74,7 +74,7 @@ def test_scene_prints_starters() -> None:
 
 def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
     scene.write_text(
-        'robot = "planar_2r"\nduration_s = 1.0\nmethod = "explicit_euler"\nstep_s = 0.1\n'
+        'robot = "planar_2r"\nduration_s = 1.0\nmethod = "Euler"\nstep_s = 0.1\n'
         '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1e5\nrest_rad = 1.0\n'
     )
     done = run("simulate", scene)
@@ -98,7 +98,7 @@ FixedSteps.advance = watched
 
 
 def test_ctrl_c_ends_a_run_and_keeps_it(scene, tmp_path) -> None:
-    text = 'robot = "planar_2r"\nduration_s = 9000.0\nmethod = "rk4"\nstep_s = 1e-3\nengine = "interpreted"\n'
+    text = 'robot = "planar_2r"\nduration_s = 9000.0\nmethod = "RK4"\nstep_s = 1e-3\nengine = "interpreted"\n'
     scene.write_text(text + "[start]\nq = [0.4, -0.7]\n")  # it would run for many minutes
     output = tmp_path / "run.npz"
     assert "stopped at t = " in interrupted_at_work("simulate", scene, "-o", output, watched=WATCHED)

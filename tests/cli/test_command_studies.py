@@ -15,7 +15,7 @@ from tests.long import long
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n{}\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n'
 DRAG = '[[effect]]\nkind = "viscous_friction"\ndamping_N_m_s_per_rad = 0.3\n'
 SCENES = {"accuracy": SCENE.format('engine = "interpreted"'), "cost": SCENE.format("accuracy = 1e-6") + DRAG}
-METHODS = ("--method", "rk4", "--method", "explicit_euler")
+METHODS = ("--method", "RK4", "--method", "Euler")
 FEW = {"accuracy": (*METHODS, "--repeats", "1", "--no-peers"), "cost": ("--budget", "0.2", "--repeats", "2")}
 FEW["certify"] = ("--samples", "100", "--repeats", "1")
 TABLES = {"accuracy": "method,engine", "cost": "group,what", "certify": "quantity,implementation,given,typical"}
@@ -30,7 +30,7 @@ def scene(tmp_path: Path, command: str) -> Path:
 
 SENTENCES = {
     "accuracy": (
-        r"\d+ digits of q over 0\.1 s: rk4", r"explicit_euler \(interpreted\)", "planar_2r: gravity 9.807 m/s²",
+        r"\d+ digits of q over 0\.1 s: RK4", r"Euler \(interpreted\)", "planar_2r: gravity 9.807 m/s²",
     ),
     "cost": (
         r"a step of RK4 takes \d+ instructions, .*: rigid bodies \d+, gravity \d+, viscous",

@@ -17,7 +17,8 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
         tmp_path / "out",
     )
     said = command.run(
-        "sweep", str(path), "-o", str(out), "--figure", "worst=peak('error')", "--runs", "96", "--design", "latin",
+        "sweep", str(path), "-o", str(out), "--figure", "worst=peak('tracking_error')", "--runs", "96",
+        "--design", "latin",
         "--probability", "worst > 0.001", "--samples", "samples('q', 'u', every=48)",
     )  # fmt: skip
     assert said.returncode == 0, said.stderr

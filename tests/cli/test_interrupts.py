@@ -56,7 +56,7 @@ def interrupted(delays: list[float], *args: str | Path, code: str = READY) -> It
 
 @pytest.mark.parametrize(
     ("method", "estimate", "delays"),
-    [("DOP853", "true", DELAYS[2::6]), *long([("DOP853", "true", DELAYS[::4]), ("Rosenbrock", "false", DELAYS[1::2])])],
+    [("DOP853", "true", DELAYS[2::6]), *long([("DOP853", "true", DELAYS[::4]), ("Rodas5P", "false", DELAYS[1::2])])],
 )
 def test_a_run_may_be_interrupted_at_any_moment(method: str, estimate: str, delays: list, tmp_path: Path) -> None:
     """While it imports, reads, runs: it would take minutes by itself."""

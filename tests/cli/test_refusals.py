@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, to in LINKS.items():
         (folder / name).symlink_to(to)
     os.mkfifo(folder / "pipe.npz")
-    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, integrator="rk4")
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="RK4")
     rd.simulate(setup).save(folder / "run.npz")
     rd.rollouts(setup, [[0.1], [0.2]]).save(folder / "runs.npz")
     return folder

@@ -82,7 +82,7 @@ PENDULUM = """
 robot = "pendulum"
 duration_s = 40.0
 engine = "interpreted"
-method = "rk4"
+method = "RK4"
 step_s = 0.05
 [start]
 q = 0.4

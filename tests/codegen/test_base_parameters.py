@@ -165,11 +165,11 @@ def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
     """By the summary and the run file of runs in machine code, of the plant or of a model; by no interpreted run."""
     given, q = arm("0 1.57079632679 0.3"), [0.2]
     words = "rpy of elbow taken as exact multiples of π/2 (changed by at most 5e-12 rad)"
-    options = {"q0": q, "duration_s": 0.01, "integrator": "rk4", "estimate_error": False}
+    options = {"q0": q, "duration_s": 0.01, "method": "RK4", "estimate_error": False}
     run = rd.simulate(given, **options, engine="compiled")
     assert f"\nright angles, in machine code: {words}\n" in run.summary
     assert rd.read(run.save(tmp_path / "run")).about["right_angles"] == words
-    runs = rd.rollouts(given, q, duration_s=0.01, integrator="rk4")
+    runs = rd.rollouts(given, q, duration_s=0.01, method="RK4")
     assert runs.about["right_angles"] == words and words in runs[0].summary
     interpreted = rd.simulate(given, **options, engine="interpreted")
     exact = rd.simulate(completed(given)[0], **options, engine="compiled")

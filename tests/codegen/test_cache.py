@@ -273,8 +273,8 @@ compiled, object_file = [], machine_code.object_file
 machine_code.object_file = lambda *given: compiled.append(given) or object_file(*given)
 arm = rd.load("planar_2r")
 q, v, tau = np.array([0.3, -0.8]), np.array([0.5, 0.4]), np.array([1.0, -2.0])
-one = rd.Compiled(arm).forward_dynamics(q, v, tau)
-many = rd.Compiled(arm).forward_dynamics(np.tile(q, (100, 1)), np.tile(v, (100, 1)), np.tile(tau, (100, 1)))
+one = rd.compiled(arm).forward_dynamics(q, v, tau)
+many = rd.compiled(arm).forward_dynamics(np.tile(q, (100, 1)), np.tile(v, (100, 1)), np.tile(tau, (100, 1)))
 print(json.dumps([len(compiled), one.tolist(), many[7].tolist()]))
 """
 

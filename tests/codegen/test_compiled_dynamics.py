@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn import Compiled
 from robot_dyn.codegen import CompiledDynamics, CompiledPlant, Kernel, SelfCheckError, SizeWarning, Trace
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import QueryError, SingularError
@@ -255,7 +254,7 @@ EFFECTS["all"] = [effect for effects in EFFECTS.values() for effect in effects]
 
 
 def plant(effects: list[Any]) -> CompiledPlant:
-    compiled = Compiled(rd.Plant(ROBOT, effects), cache=False)
+    compiled = rd.compiled(rd.Plant(ROBOT, effects), cache=False)
     assert isinstance(compiled, CompiledPlant)
     return compiled
 
@@ -269,7 +268,7 @@ def test_a_compiled_plant_is_the_interpreted_one(name: str) -> None:
         for method in ("N", "torque", "forward_dynamics"):
             rest = (9 * u,) if method == "forward_dynamics" else ()
             ours, theirs = (
-                np.array([getattr(each, method)(t, *row) for row in zip(q, v, *rest, strict=True)])
+                np.array([getattr(each, method)(*row, t=t) for row in zip(q, v, *rest, strict=True)])
                 for each in (compiled, compiled.interpreted)
             )
             assert np.max(np.abs(ours - theirs)) <= 1e-12 * np.max(np.abs(theirs))
@@ -280,10 +279,10 @@ def test_a_batch_of_a_plant_is_its_states_one_by_one() -> None:
     compiled = plant(EFFECTS["all"])
     q, v, u = states(2, 100)
     t = np.linspace(0, 1, 100)
-    batch = compiled.forward_dynamics(t, q, v, u)
-    single = np.array([compiled.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)])
+    batch = compiled.forward_dynamics(q, v, u, t=t)
+    single = np.array([compiled.forward_dynamics(*row, t=time) for time, *row in zip(t, q, v, u, strict=True)])
     assert np.max(np.abs(batch - single)) <= 1e-12 * np.max(np.abs(single))
-    back = compiled.inverse_dynamics(t, q, v, batch)
+    back = compiled.inverse_dynamics(q, v, batch, t=t)
     assert np.max(np.abs(back - np.clip(u, -5, 5))) <= 1e-9
 
 
@@ -299,10 +298,12 @@ def test_plants_that_differ_in_numbers_share_their_machine_code(monkeypatch: pyt
             rd.effects.EffortLimit(limit),
             rd.effects.RegularisedCoulombFriction(mass, 0.1),
         ]
-        compiled = Compiled(rd.Plant(robot, effects), cache=False)
-        expected = np.array([compiled.interpreted.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)])
-        batch = compiled.forward_dynamics(t, q, v, u)
-        single = [compiled.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)]
+        compiled = rd.compiled(rd.Plant(robot, effects), cache=False)
+        expected = np.array(
+            [compiled.interpreted.forward_dynamics(*row, t=time) for time, *row in zip(t, q, v, u, strict=True)]
+        )
+        batch = compiled.forward_dynamics(q, v, u, t=t)
+        single = [compiled.forward_dynamics(*row, t=time) for time, *row in zip(t, q, v, u, strict=True)]
         for ours in (batch, single):
             assert np.max(np.abs(ours - expected)) <= 1e-12 * np.max(np.abs(expected))
 
@@ -316,7 +317,7 @@ def test_what_is_off_costs_no_instruction() -> None:
     """A plant without effects has the instructions of the robot."""
     bare, full = plant([]), plant(EFFECTS["all"])
     for engine in (bare, full):
-        engine.forward_dynamics(0.0, *np.ones((3, 2)))
+        engine.forward_dynamics(*np.ones((3, 2)), t=0.0)
     (without,), (with_all,) = (each.instructions["forward_dynamics"].values() for each in (bare, full))
     assert without == min(Trace(bare.dynamics.robot).quantity("forward_dynamics").counts.values())
     assert with_all > without
@@ -327,8 +328,8 @@ def test_machine_code_does_not_keep_the_plant_that_it_was_made_for() -> None:
     """What stays loaded is known by its instructions alone."""
     made = plant([rd.effects.ViscousFriction([0.31, 0.12])])
     q, v, u = states(2, 12)
-    made.forward_dynamics(0.0, q[0], v[0], u[0])
-    made.forward_dynamics(0.0, q, v, u)
+    made.forward_dynamics(q[0], v[0], u[0], t=0.0)
+    made.forward_dynamics(q, v, u, t=0.0)
     left = weakref.ref(made.plant), weakref.ref(made.plant.effects[0]), weakref.ref(made.engine)
     del made
     gc.collect()
@@ -339,7 +340,7 @@ def test_numpy_clip_is_the_minimum_of_a_maximum() -> None:
     """Of six joints with two bounds each: as branches these would be 3⁶."""
     most = np.array([6.0] * 3 + [1.2] * 3)
     law = rd.control.ControlLaw(lambda t, q, v: np.clip(-40.0 * (q - 0.3) - 10.0 * v, -2.0, most), 6)
-    setup = rd.Setup(rd.Plant(rd.load("ur5")), [0.1] * 6, duration_s=0.05, integrator="rk4", controller=law)
+    setup = rd.Setup(rd.Plant(rd.load("ur5")), [0.1] * 6, duration_s=0.05, method="RK4", controller=law)
     interpreted, compiled = (rd.simulate(setup, engine=each) for each in ("interpreted", "compiled"))
     assert compiled.statistics.engine == "compiled"
     np.testing.assert_allclose(compiled.q, interpreted.q, rtol=0, atol=1e-12)

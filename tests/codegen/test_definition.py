@@ -293,7 +293,7 @@ def in_another_process(module: Any, store: Memory, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(cache, "_functions", LRUByIdentity())
     monkeypatch.setattr(cache, "_symbols", LRUByIdentity())
     monkeypatch.setattr(cache, "default_store", lambda: store)
-    made = machine_code(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.integrate.method("rk4"))
+    made = machine_code(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.integrate.method("RK4"))
     return str(made.code.programs["rate"])
 
 

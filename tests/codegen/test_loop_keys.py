@@ -189,7 +189,7 @@ def test_sources_are_in_the_keys_of_kernels_programs_and_equations(monkeypatch: 
     assert {"writer.py", "elementary.py"} <= kernel[1]
     texts: list[list[str]] = []
     monkeypatch.setattr("robot_dyn.codegen.kernel.digest", lambda of: texts.append(of) or digest(of))
-    rd.Compiled(rd.load("planar_2r"), cache=False).M([0.1, 0.2])
+    rd.compiled(rd.load("planar_2r"), cache=False).M([0.1, 0.2])
     assert texts
     assert all(kernel[0] in each for each in texts)
 

@@ -129,11 +129,11 @@ def test_machine_code_of_a_robot_and_of_a_batch_is_logged(
 ) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     robot = rd.load("planar_2r").with_(mass_scale=1.017)
-    rd.Compiled(robot).M([0.4, -0.7])
+    rd.compiled(robot).M([0.4, -0.7])
     assert ring(clocks, caplog) == [
         "tracing M of planar_2r",
         "compiling M of planar_2r, once for these equations",
     ]
     clocks.clear()
-    rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, integrator="rk4", step_s=1e-3)
+    rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, method="RK4", step_s=1e-3)
     assert "compiling the equations of this run, once for its structure" in ring(clocks, caplog)

@@ -229,7 +229,7 @@ class Solving(rd.control.Stateless):
 @pytest.mark.parametrize("function", ["solve", "inv"])
 def test_linear_systems_within_a_law_are_compiled(function: str) -> None:
     """Equal to LAPACK's in the interpreted engine, to rounding."""
-    arm, options = rd.load("planar_2r"), {"v0": [1.0, -0.5], "duration_s": 0.1, "integrator": "rk4", "step_s": 1e-3}
+    arm, options = rd.load("planar_2r"), {"v0": [1.0, -0.5], "duration_s": 0.1, "method": "RK4", "step_s": 1e-3}
     ends = [
         rd.simulate(arm, [0.1, 0.2], controller=Solving(arm, function), engine=engine, estimate_error=False, **options)
         for engine in ("interpreted", "compiled")
@@ -240,5 +240,5 @@ def test_linear_systems_within_a_law_are_compiled(function: str) -> None:
 def test_other_functions_of_linear_algebra_are_named() -> None:
     arm = rd.load("planar_2r")
     with pytest.raises(rd.RobotDynError) as refused:
-        rd.rollouts(arm, [[0.1, 0.2]], duration_s=0.1, integrator="rk4", controller=Solving(arm, "det"))
+        rd.rollouts(arm, [[0.1, 0.2]], duration_s=0.1, method="RK4", controller=Solving(arm, "det"))
     assert "np.linalg.det" in str(refused.value) and "np.linalg.solve" in str(refused.value)

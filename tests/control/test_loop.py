@@ -34,7 +34,7 @@ def run(
 ) -> rd.Trajectory:
     """A run with a sample at each quarter of a period, which is no tick."""
     setup = rd.Setup(
-        PLANT, Q0, V0, periods * T, controller, rd.integrate.Adaptive("DOP853", 1e-12, 1e-14), record_period_s=T / 4,
+        PLANT, Q0, V0, periods * T, controller, rd.integrate.Adaptive("DOP853", 1e-12, 1e-14), record_every_s=T / 4,
         engine=engine, estimate_error=False,
     )  # fmt: skip
     return rd.simulate(setup, **options)  # type: ignore[arg-type]
@@ -174,7 +174,7 @@ EVERYTHING = rd.control.Loop(
 @pytest.mark.long  # delays, two rates and noise are compared one by one in short
 def test_machine_code_and_rollouts_run_the_same_loop() -> None:
     """To rounding: no sample is near the edge of a step. Steps of RK4 are alike in all three."""
-    setup = rd.Setup(PLANT, Q0, V0, 20 * T, EVERYTHING, "rk4", T / 8, T, estimate_error=False, engine="interpreted")
+    setup = rd.Setup(PLANT, Q0, V0, 20 * T, EVERYTHING, "RK4", T / 8, T, estimate_error=False, engine="interpreted")
     one, two = rd.simulate(setup), rd.simulate(setup, engine="compiled")
     many = rd.rollouts(setup, np.tile(Q0, (70, 1)), np.tile(V0, (70, 1)), record=("q", "v", "u"), threads=2)
     np.testing.assert_allclose(two.q, one.q, atol=1e-13)
@@ -188,7 +188,7 @@ def test_machine_code_and_rollouts_run_the_same_loop() -> None:
 
 
 def test_coefficients_of_blocks_are_swept_by_name() -> None:
-    setup = rd.Setup(PLANT, Q0, V0, 10 * T, EVERYTHING, "rk4", T / 4, T, estimate_error=False)
+    setup = rd.Setup(PLANT, Q0, V0, 10 * T, EVERYTHING, "RK4", T / 4, T, estimate_error=False)
     params = {
         "position.quantisation.resolution": [1e-3, 4e-3], "velocity.low_pass.cutoff": [40.0, 20.0],
         "actuation.rate_limit.rate": [300.0, 50.0], "position.noise.deviation": [1e-4, 0.0], "kp": [9.0, 50.0],
@@ -241,7 +241,7 @@ def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
     """They do not change between ticks: the mean of squares of the local error is that of the others."""
     arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), 0.0, 0.0, 1.0)
     made = [
-        rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, integrator="DOP853", estimate_error=False)
+        rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, method="DOP853", estimate_error=False)
         for x in (free, rd.control.Loop(free, actuation_delay=50))
     ]
     assert made[0].statistics.steps == made[1].statistics.steps
@@ -262,10 +262,10 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     M = np.linalg.inv(matrices()[1][2:])
     kd = 2.24 / T / np.abs(np.linalg.eigvals(np.linalg.inv(M))).max()
     loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), 0.0, kd, T), actuation_delay=late)
-    for integrator in ("rk4", "DOP853"):
+    for integrator in ("RK4", "DOP853"):
         for engine in ("interpreted", "compiled"):
-            options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
-            made = rd.simulate(PLANT, Q0, V0, controller=loop, record_period_s=T, **options)  # type: ignore[arg-type]
+            options = {"method": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
+            made = rd.simulate(PLANT, Q0, V0, controller=loop, record_every_s=T, **options)  # type: ignore[arg-type]
             assert RemarkKind.CHATTER in {remark.kind for remark in made.remarks}
 
 
@@ -277,7 +277,7 @@ def test_ticks_of_two_instants_a_period() -> None:
 
 def test_what_is_rounded_shows_no_order() -> None:
     """A sample may be rounded the other way in the exact motion: its error is bounded by companions, not divided."""
-    setup = rd.Setup(PLANT, Q0, V0, 10 * T, PD, "rk4", T / 8)
+    setup = rd.Setup(PLANT, Q0, V0, 10 * T, PD, "RK4", T / 8)
     assert rd.simulate(setup).error.verdict is Verdict.ORDER
     made = rd.simulate(setup, controller=rd.control.Loop(PD, position=rd.control.Quantisation(1e-4))).error
     assert made.verdict is Verdict.BOUND

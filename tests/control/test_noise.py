@@ -66,17 +66,17 @@ def test_noise_is_the_same_alone_in_batches_and_in_threads() -> None:
     loop = rd.control.Loop(
         rd.control.PD(rd.control.hold([0.0, 0.0]), WEAK, 0.0, PERIOD), position=rd.control.Noise(1.0), seed=SEED
     )
-    given = {"duration_s": TICKS * PERIOD, "record_period_s": PERIOD}
+    given = {"duration_s": TICKS * PERIOD, "record_every_s": PERIOD}
     expected = [-WEAK * deviates(SEED, run, TICKS + 1, 2) for run in range(130)]
-    for integrator in ("rk4", "DOP853"):
+    for integrator in ("RK4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             for run in (0, 77):
                 each = replace(loop, run=run)
-                options = given | {"integrator": integrator, "engine": engine, "estimate_error": False}
+                options = given | {"method": integrator, "engine": engine, "estimate_error": False}
                 made = rd.simulate(ARM, [0.0, 0.0], controller=each, **options)
                 assert made.u.tobytes() == expected[run].tobytes(), (integrator, engine, run)
         for threads in (1, 2):
-            options = given | {"integrator": integrator, "record": ("u",), "threads": threads}
+            options = given | {"method": integrator, "record": ("u",), "threads": threads}
             runs = rd.rollouts(ARM, np.zeros((130, 2)), controller=loop, **options)
             assert runs.u.tobytes() == np.array(expected).tobytes(), (integrator, threads)
 
@@ -89,7 +89,7 @@ def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
         actuation_delay=1.5, seed=4,
     )  # fmt: skip
     run = rd.simulate(
-        ARM, [0.0, 0.0], controller=loop, integrator="rk4", step_s=1e-3, duration_s=0.1, record_period_s=PERIOD
+        ARM, [0.0, 0.0], controller=loop, method="RK4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD
     )
     np.testing.assert_array_equal(
         run.u[2:], -WEAK * deviates(4, 0, 11, 2)[:9]
@@ -102,7 +102,7 @@ def test_noise_makes_no_velocity_at_the_first_tick() -> None:
     """Before the start the arm was measured where it starts, with the noise of the first tick."""
     noise = {"position": rd.control.Noise(1e-3), "velocity": rd.control.Differences()}
     loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0, 0.0]), 0.0, WEAK, PERIOD), **noise)  # type: ignore[arg-type]
-    run = rd.simulate(ARM, [0.3, 0.2], controller=loop, duration_s=0.1, record_period_s=PERIOD, estimate_error=False)
+    run = rd.simulate(ARM, [0.3, 0.2], controller=loop, duration_s=0.1, record_every_s=PERIOD, estimate_error=False)
     assert not run.u[0].any()
     expected = -WEAK * np.diff(0.2 + 1e-3 * deviates(0, 0, 11, 2)[:, 1]) / PERIOD
     np.testing.assert_allclose(run.u[1:, 1], expected, rtol=1e-9)

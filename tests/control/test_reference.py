@@ -296,9 +296,9 @@ def test_the_estimate_along_dense_samples_is_honest() -> None:
     reference = Samples(t, *motion(t)[:2])
     controller = rd.control.ComputedTorque(arm, reference, 100.0, 20.0)
     setup = rd.Setup(
-        rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, integrator="rk4", step_s=5e-3
+        rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, method="RK4", step_s=5e-3
     )
-    run, truth = rd.simulate(setup), rd.simulate(setup, integrator="rk4", step_s=3e-4, estimate_error=False)
+    run, truth = rd.simulate(setup), rd.simulate(setup, method="RK4", step_s=3e-4, estimate_error=False)
     error = np.abs(run.q[-1] - truth.q[-1]).max()
     assert run.error is not None and run.error.until_s == 0.3
     assert 0 < error < 2 * run.error.largest < 1e-4

@@ -136,7 +136,7 @@ def test_a_motion_without_whole_turns_is_taken_as_it_is(robot: rd.Robot, q: np.n
 def test_the_table_of_a_run_is_never_joined() -> None:
     """Its velocities determine the motion: 5 rad in 2 s, between two samples."""
     robot = arm()
-    run = rd.simulate(robot, q0=[0.0, 0.0], v0=[2.5, 0.0], duration_s=4.0, record_period_s=2.0)
+    run = rd.simulate(robot, q0=[0.0, 0.0], v0=[2.5, 0.0], duration_s=4.0, record_every_s=2.0)
     plan = rd.control.from_samples(robot, {name: x[:2] for name, x in run.table().items()}, ends="measured")
     assert plan.reference.at(2.0)[0][0] == pytest.approx(run.q[1, 0], abs=1e-9)
     assert not plan.findings

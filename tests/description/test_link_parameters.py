@@ -42,7 +42,7 @@ def test_a_link_with_another_mass_and_inertia_is_that_of_an_edited_file() -> Non
         expected = ask(theirs)
         np.testing.assert_allclose(ask(ours), expected, rtol=1e-14, atol=1e-14)
         np.testing.assert_allclose(ask(rd.Lagrangian(ours)), expected, rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(ask(rd.Compiled(ours)), expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(ask(rd.compiled(ours)), expected, rtol=1e-12, atol=1e-12)
     assert np.abs(ours.M(q) - TREE.with_(**more).M(q)).max() > 0.01
     assert ours.total_mass == pytest.approx(theirs.total_mass, rel=1e-14)
 
@@ -52,7 +52,7 @@ def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
     control = None if model is None else rd.control.ComputedTorque(model, plan, 50.0, 9.0)
     return rd.Setup(
         rd.Plant(robot, [rd.effects.ViscousFriction(0.3)]), STATES[0], STATES[1], duration_s=0.2, controller=control,
-        integrator="rk4", step_s=1e-3, record_period_s=0.02, estimate_error=False,
+        method="RK4", step_s=1e-3, record_every_s=0.02, estimate_error=False,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, TraceError
+from robot_dyn.foundations import TraceError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")
@@ -19,12 +19,12 @@ BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 G = 9.80665
 
 
-@pytest.mark.parametrize("method", [TIGHT, "rk4"], ids=["DOP853", "rk4"])
+@pytest.mark.parametrize("method", [TIGHT, "RK4"], ids=["DOP853", "RK4"])
 @BOTH
 def test_a_slider_keeps_its_momentum_and_the_ledger_has_what_was_lost(method, engine: str) -> None:
     """F on m, M at rest from 0.3 s, μ at the slider's speed from 0.5 s, both dropped by turns: parabolas, 1e-12.
 
-    rk4 is exact on them but for rounding. Work of a body: M g z and ½ M v² that come and go with it.
+    RK4 is exact on them but for rounding. Work of a body: M g z and ½ M v² that come and go with it.
     """
     F, M, mu, z = 2.0, 0.9, 0.4, 0.3
     bodies = [
@@ -32,8 +32,8 @@ def test_a_slider_keeps_its_momentum_and_the_ledger_has_what_was_lost(method, en
         rd.effects.CarriedPayload(rd.Payload("cart", mu), 0.5, 0.9, at_rest=False),
     ]
     run = rd.simulate(
-        rd.Plant(SLIDER, bodies), [0.1], [0.8], duration_s=1.2, controller=Ramp(F), integrator=method, engine=engine,
-        record_period_s=0.05, estimate_error=False,
+        rd.Plant(SLIDER, bodies), [0.1], [0.8], duration_s=1.2, controller=Ramp(F), method=method, engine=engine,
+        record_every_s=0.05, estimate_error=False,
     )  # fmt: skip
     q, v, t, expected, speeds = 0.1, 0.8, 0.0, {}, []
     for end, m, after in [(0.3, MASS, MASS / (MASS + M)), (0.5, MASS + M, 1), (0.7, MASS + M + mu, 1),
@@ -68,7 +68,7 @@ def test_a_pendulum_swings_on_with_the_momentum_it_had() -> None:
     inertia = link + 0.6 * (0.4**2 + 0.05**2)
     assert carrying.M([0.3])[0, 0] == pytest.approx(inertia, rel=1e-14)
     plant = rd.Plant(robot, [rd.effects.CarriedPayload(body, 0.5, 1.1)])
-    run = rd.simulate(plant, [0.9], [1.3], duration_s=2.0, integrator=TIGHT, record_period_s=0.01)
+    run = rd.simulate(plant, [0.9], [1.3], duration_s=2.0, method=TIGHT, record_every_s=0.01)
     energies = [
         np.array([dynamics.total_energy(q, v) for q, v in zip(run.q[part], run.v[part], strict=True)])
         for dynamics, part in ((robot, run.t < 0.4999), (carrying, (run.t > 0.5001) & (run.t < 1.0999)),
@@ -88,7 +88,7 @@ def test_a_pendulum_swings_on_with_the_momentum_it_had() -> None:
 @BOTH
 def test_a_run_is_those_of_the_robots_before_and_behind_joined_by_the_momentum(at_rest: bool, engine: str) -> None:
     """Each by itself, from the state that the law gives: (M + ΔM) v⁺ = M v⁻, or v⁺ = v⁻; 1e-11."""
-    options = {"integrator": TIGHT, "estimate_error": False, "record_period_s": 0.1, "engine": engine}
+    options = {"method": TIGHT, "estimate_error": False, "record_every_s": 0.1, "engine": engine}
     carrying = ARM.with_(payload=BODY)
     first = rd.simulate(ARM, Q, V, duration_s=0.3, **options)
     q, v = first.q[-1], first.v[-1]
@@ -116,7 +116,7 @@ def test_what_is_stuck_is_kicked_loose_and_what_rests_at_a_stop_stays_above_it(e
         rd.effects.CarriedPayload(rd.Payload("tip", 0.3), 0.2, 0.45, at_rest=False),
     ]  # fmt: skip
     control = rd.control.PD(rd.control.quintic(Q, [0.9, 1.1], 0.8), 40.0, 8.0, period_s=0.02)
-    options = {"integrator": TIGHT, "engine": engine, "record_period_s": 0.01, "estimate_error": False}
+    options = {"method": TIGHT, "engine": engine, "record_every_s": 0.01, "estimate_error": False}
     run = rd.simulate(rd.Plant(ARM, effects), Q, duration_s=1.0, controller=control, **options)
     names = [each.name for each in run.events]
     assert names.count("payload on tip dropped") == 2 and "payload on tip picked up at rest" in names
@@ -129,7 +129,7 @@ def test_a_joint_that_sticks_slides_when_the_impact_reaches_it() -> None:
     """One joint moves, the other sticks: v⁺ of both is that of the law without friction, which is finite."""
     light, q, v = ARM.with_(gravity=(0, 0, 0)), np.array([0.3, 0.9]), np.array([1.5, 0.0])
     plant = rd.Plant(light, [rd.effects.DryFriction([0.0, 50.0]), rd.effects.CarriedPayload(BODY, 0.1)])
-    run = rd.simulate(plant, q, v, duration_s=0.2, integrator=TIGHT, record_period_s=0.05)
+    run = rd.simulate(plant, q, v, duration_s=0.2, method=TIGHT, record_every_s=0.05)
     at = next(each for each in run.events if "picked up" in each.name)
     place = q + 0.1 * v
     np.testing.assert_allclose(at.q, place, atol=1e-12)
@@ -139,7 +139,7 @@ def test_a_joint_that_sticks_slides_when_the_impact_reaches_it() -> None:
 
 
 def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
-    plant, options = rd.Plant(ARM, [rd.effects.CarriedPayload(BODY, 0.1, 0.2)]), {"record_period_s": 0.05}
+    plant, options = rd.Plant(ARM, [rd.effects.CarriedPayload(BODY, 0.1, 0.2)]), {"record_every_s": 0.05}
     setup = rd.Setup(plant, Q, V, 0.3, None, "DOP853", **options, estimate_error=False)
     runs = rd.rollouts(setup, params={"gravity": [[0, 0, -G], [0, 0, -1.6]]}, record=("q", "work"))
     moon = replace(setup, plant=rd.Plant(ARM.with_(gravity=(0, 0, -1.6)), setup.plant.effects))
@@ -155,22 +155,20 @@ def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
 
 
 def test_a_plant_is_asked_at_a_time() -> None:
-    """N and accelerations know the time; M and C are those of `at` a time, and refuse without."""
+    """All queries and `linearise` take the time; machine code is refused."""
     body = rd.effects.CarriedPayload(BODY, 0.1, 0.2)
     plant, carrying = (
         rd.Plant(ARM, [rd.effects.ViscousFriction(0.1), body]),
         rd.Plant(ARM.with_(payload=BODY), [rd.effects.ViscousFriction(0.1)]),
     )
     for t, other in ((0.05, rd.Plant(ARM, [rd.effects.ViscousFriction(0.1)])), (0.15, carrying)):
-        np.testing.assert_array_equal(plant.N(t, Q, V), other.N(t, Q, V))
-        np.testing.assert_array_equal(plant.forward_dynamics(t, Q, V, V), other.forward_dynamics(t, Q, V, V))
-        np.testing.assert_array_equal(plant.inverse_dynamics(t, Q, V, V), other.inverse_dynamics(t, Q, V, V))
-        np.testing.assert_array_equal(plant.at(t).M(Q), other.M(Q))
+        np.testing.assert_array_equal(plant.N(Q, V, t=t), other.N(Q, V, t=t))
+        np.testing.assert_array_equal(plant.forward_dynamics(Q, V, V, t=t), other.forward_dynamics(Q, V, V, t=t))
+        np.testing.assert_array_equal(plant.inverse_dynamics(Q, V, V, t=t), other.inverse_dynamics(Q, V, V, t=t))
+        np.testing.assert_array_equal(plant.M(Q, t=t), other.M(Q))
+        np.testing.assert_array_equal(plant.C(Q, V, t=t), other.C(Q, V))
         np.testing.assert_array_equal(rd.linearise(plant, Q, V, t=t)[0], rd.linearise(other, Q, V)[0])
-    for ask in (lambda: plant.M(Q), lambda: plant.C(Q, V)):
-        with pytest.raises(
-            EffectError, match=r"depends on the carried payloads, and so on the time: use plant.at\(t\)"
-        ):
-            ask()
-    with pytest.raises(TraceError, match=r"carried_payload is temporary: use plant.at\(t\)"):
-        rd.Compiled(plant).forward_dynamics(0.0, Q, V, V)
+    compiled = rd.compiled(plant)
+    for query in (lambda: compiled.forward_dynamics(Q, V, V, t=0.0), lambda: compiled.M(Q), lambda: compiled.C(Q, V)):
+        with pytest.raises(TraceError, match=r"carried_payload is temporary: use plant.at\(t\)"):
+            query()

@@ -39,7 +39,7 @@ def test_causes_of_random_arms_add_up_to_inverse_dynamics(tree: RandomTree, seed
     plant = rd.Plant(arm, [*friction, rd.effects.Spring(2.0, 0.1)])
     t, q, v, a = motion(arm.n, seed=seed)
     split = torques_by_cause(plant, t, q, v, a)
-    tau = np.array([plant.inverse_dynamics(*each) for each in zip(t.tolist(), q, v, a, strict=True)])
+    tau = np.array([plant.inverse_dynamics(*row, t=time) for time, *row in zip(t.tolist(), q, v, a, strict=True)])
     largest = max(np.abs(each).max() for each in split.torques.values())
     assert np.abs(split.tau - tau).max() <= ROUNDING * largest
     assert np.abs(sum(split.torques.values()) - tau).max() <= ROUNDING * largest
@@ -97,7 +97,7 @@ def test_a_payload_that_comes_and_goes_is_one_cause() -> None:
     np.testing.assert_allclose(split.torques["carried_payload"], expected, rtol=1e-11, atol=1e-11)
     lifted = split.torques["carried_payload 2"][:, :2]  # the joints below the link that carries it
     assert not lifted[t < 0.5].any() and lifted[t >= 0.5].all()
-    tau = np.array([plant.inverse_dynamics(*each) for each in zip(t.tolist(), q, v, a, strict=True)])
+    tau = np.array([plant.inverse_dynamics(*row, t=time) for time, *row in zip(t.tolist(), q, v, a, strict=True)])
     assert np.abs(split.tau - tau).max() <= ROUNDING * np.abs(tau).max()
     assert np.abs(split.unexplained).max() <= ROUNDING * np.abs(tau).max()
 
@@ -144,7 +144,7 @@ def test_causes_add_up_to_inverse_dynamics(name: str) -> None:
     plant, rng = plants()[name], np.random.default_rng(5)
     for t in (0.0, 0.7):
         q, v, a = rng.uniform(-1.5, 1.5, (3, plant.dynamics.n))
-        tau = plant.inverse_dynamics(t, q, v, a)
+        tau = plant.inverse_dynamics(q, v, a, t=t)
         for i, joint in enumerate(plant.dynamics.joint_names):
             why = rd.why(plant, q, v, a, joint, t=t)
             parts = [x for share in why.shares for x in (share.inertia, share.coriolis, share.gravity)]

@@ -184,7 +184,7 @@ def test_effort_limit_cuts_the_actuation() -> None:
     assert isinstance(bound, Bound)
     np.testing.assert_array_equal(bound.actuation(np.array([[3.0, 99.0], [-2.0, -99.0]])), [[1.0, 99.0], [-1.0, -99.0]])
     plant, still = Plant(ROBOT, [bound]), np.zeros(2)
-    cut = plant.forward_dynamics(0.0, still, still, [3.0, 2.0])
+    cut = plant.forward_dynamics(still, still, [3.0, 2.0], t=0.0)
     assert np.array_equal(cut, ROBOT.forward_dynamics(still, still, np.array([1.0, 2.0])))
 
 
@@ -192,10 +192,10 @@ def test_an_effect_is_evaluated_once_in_a_query_that_has_torques() -> None:
     on, calls = counted()
     (q,), (v,) = states(1)
     plant = Plant(ROBOT, [on])
-    plant.forward_dynamics(1.5, q, v, v)
+    plant.forward_dynamics(q, v, v, t=1.5)
     assert calls == [1.5]
-    plant.inverse_dynamics(2.0, q, v, v)
-    plant.N(2.5, q, v)
+    plant.inverse_dynamics(q, v, v, t=2.0)
+    plant.N(q, v, t=2.5)
     assert calls == [1.5, 2.0, 2.5]
     plant.M(q)
     plant.C(q, v)
@@ -209,12 +209,12 @@ def test_plant_keeps_the_equation_of_motion(engine, batch) -> None:
     rng = np.random.default_rng(2)
     q, v, a = rng.normal(size=(3, *batch, ROBOT.n))
     plant = Plant(engine, list(FORMULAS))
-    u = plant.inverse_dynamics(0.2, q, v, a)
-    terms = np.matvec(plant.M(q), a) + np.matvec(plant.C(q, v), v) + plant.N(0.2, q, v)
+    u = plant.inverse_dynamics(q, v, a, t=0.2)
+    terms = np.matvec(plant.M(q), a) + np.matvec(plant.C(q, v), v) + plant.N(q, v, t=0.2)
     np.testing.assert_allclose(u, terms, rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(plant.forward_dynamics(0.2, q, v, u), a, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(plant.forward_dynamics(q, v, u, t=0.2), a, rtol=1e-12, atol=1e-12)
     full_N = engine.N(q) - sum(FORMULAS[effect](0.2, q, v) for effect in FORMULAS)
-    np.testing.assert_allclose(plant.N(0.2, q, v), full_N, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(plant.N(q, v, t=0.2), full_N, rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.parametrize("method", ["N", "forward_dynamics", "inverse_dynamics", "torque"])
@@ -222,7 +222,7 @@ def test_a_velocity_of_the_wrong_shape_is_refused(method: str) -> None:
     plant = Plant(ROBOT, list(FORMULAS))
     arguments = (np.ones(2),) if method in ("forward_dynamics", "inverse_dynamics") else ()
     with pytest.raises(QueryError, match="v must have shape"):
-        getattr(plant, method)(0.0, np.ones(2), np.ones(3), *arguments)
+        getattr(plant, method)(np.ones(2), np.ones(3), *arguments, t=0.0)
 
 
 def only(effect):
@@ -274,9 +274,7 @@ def test_a_stop_that_differs_from_run_to_run_moves_both_of_its_parts() -> None:
 
     def stops(at: float) -> rd.Setup:
         plant = rd.Plant(robot, rd.effects.joint_stops([-1.0], [at], 1e3, 1e2))
-        return rd.Setup(
-            plant, [0.2], [2.0], duration_s=0.2, record_period_s=0.1, estimate_error=False, integrator="rk4"
-        )
+        return rd.Setup(plant, [0.2], [2.0], duration_s=0.2, record_every_s=0.1, estimate_error=False, method="RK4")
 
     runs = rd.rollouts(stops(0.5), params={"joint_stops.upper": upper})
     for k, at in enumerate(upper):

@@ -50,7 +50,7 @@ def test_virtual_work_is_that_of_the_force_on_the_line(effect: rd.effects.LineSp
     q, v = state()
     force = K * (distance(TREE, q, effect) - LENGTH) + C * slope(q, v, effect)
     for virtual in np.random.default_rng(1).normal(size=(5, TREE.n)):
-        work = rd.Plant(TREE, [effect]).torque(0.0, q, v) @ virtual
+        work = rd.Plant(TREE, [effect]).torque(q, v, t=0.0) @ virtual
         assert work == pytest.approx(-force * slope(q, virtual, effect), rel=1e-9)
 
 
@@ -83,8 +83,8 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
     expected = centre + gap * np.array([-m[1], m[0]]) / m.sum()
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
-            rd.Plant(MASSES, [strut]), q0=q0, v0=v0, duration_s=t_end, integrator="order_8", step_s=0.01, engine=engine,
-            estimate_error=False, record_period_s=0.1,
+            rd.Plant(MASSES, [strut]), q0=q0, v0=v0, duration_s=t_end, method="DP8", step_s=0.01, engine=engine,
+            estimate_error=False, record_every_s=0.1,
         )  # fmt: skip
         np.testing.assert_allclose(run.q[-1], expected, atol=1e-12)
         spent = m @ v0**2 / 2 + k * x0**2 / 2 - m @ run.v[-1] ** 2 / 2 - k * x**2 / 2
@@ -94,20 +94,20 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
 
 def test_it_runs_in_balls_that_hold_the_float_value() -> None:
     own, (q, v) = rd.Lagrangian(TREE, rd.accuracy.Ball(200)), state()
-    torque = rd.Plant(own, [BETWEEN]).torque(0.0, q, v)
+    torque = rd.Plant(own, [BETWEEN]).torque(q, v, t=0.0)
     assert rd.accuracy.radius(torque).max() < 1e-50
-    np.testing.assert_allclose(rd.Plant(TREE, [BETWEEN]).torque(0.0, q, v), rd.accuracy.midpoint(torque), atol=1e-10)
+    np.testing.assert_allclose(rd.Plant(TREE, [BETWEEN]).torque(q, v, t=0.0), rd.accuracy.midpoint(torque), atol=1e-10)
 
 
 def test_where_the_points_meet_there_is_no_direction() -> None:
     """An error that says so; a run that comes there in either engine ends, with the same words."""
     plant = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=3.0, damping=1.0, length=0.1)])
     with pytest.raises(EffectError, match="line_spring_damper: the points of 'a' and 'b' coincide"):
-        plant.torque(0.0, np.zeros(2), np.zeros(2))
+        plant.torque(np.zeros(2), np.zeros(2), t=0.0)
     apart = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
-            apart, q0=[-0.5, 0.5], v0=[1.0, -1.0], duration_s=1.0, integrator="explicit_euler", step_s=0.125,
+            apart, q0=[-0.5, 0.5], v0=[1.0, -1.0], duration_s=1.0, method="Euler", step_s=0.125,
             engine=engine, estimate_error=False,
         )  # fmt: skip
         assert run.outcome.ending is Ending.DIVERGED

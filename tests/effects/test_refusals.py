@@ -100,23 +100,26 @@ IN_A_PLANT = [
 ]
 IN_A_RUN = [
     (lambda: rd.simulate(plant(STOPS), [0.3, 1.2]), r"q0: 'joint_2' is 0\.2 beyond its upper stop"),
-    (lambda: setup(PLAY, integrator="gauss_4"), "rigid_backlash: "),
-    (lambda: setup(PLAY, integrator="time_stepping"), "rigid_backlash: "),
-    (lambda: setup(SOFT, integrator="time_stepping"), "series_elastic: time_stepping takes no motors of a drive"),
-    (lambda: setup(BODY, integrator="gauss_4"), "carried_payload: .* changes momenta, which gauss_4 integrates"),
+    (lambda: setup(PLAY, method="GaussLegendre4"), "rigid_backlash: "),
+    (lambda: setup(PLAY, method="MoreauJean"), "rigid_backlash: "),
+    (lambda: setup(SOFT, method="MoreauJean"), "series_elastic: MoreauJean takes no motors of a drive"),
+    (
+        lambda: setup(BODY, method="GaussLegendre4"),
+        "carried_payload: .* changes momenta, which GaussLegendre4 integrates",
+    ),
     (lambda: rd.advise(plant(PLAY), Q), "advise: rigid_backlash frees and couples motors by turns"),
     (lambda: rd.advise(plant(BODY), Q), "advise: carried_payload changes the bodies"),
     *(
-        (lambda ask=ask, method=method: ask(plant(DRY), Q, integrator=method), f"dry_friction: .* {why}.*DOP853")
+        (lambda ask=ask, method=method: ask(plant(DRY), Q, method=method), f"dry_friction: .* {why}.*DOP853")
         for ask in (rd.simulate, rd.rollouts)
-        for method, why in (("gauss_4", "momenta"), ("explicit_euler", "order 1"))
+        for method, why in (("GaussLegendre4", "momenta"), ("Euler", "order 1"))
     ),
     *(
-        (lambda effect=effect: rd.rollouts(plant(effect), Q, integrator="rk4", cuts=False), f"cuts=False: {why}")
+        (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", cuts=False), f"cuts=False: {why}")
         for effect, why in (
-            (DRY, "dry_friction holds joints and lets them go, where steps must"),
-            (PLAY, "rigid_backlash holds joints"),
-            (BODY, "carried_payload comes and goes, where steps must end"),
+            (DRY, "dry_friction stops and releases joints, where steps must"),
+            (PLAY, "rigid_backlash stops and releases joints"),
+            (BODY, "carried_payload is attached and detached, where steps must end"),
         )
     ),
 ]

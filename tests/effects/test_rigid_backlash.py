@@ -21,8 +21,8 @@ REFLECTED = RATIO**2 * J
 def slide(restitution: float, engine: str, force: float, effects: tuple = ()) -> rd.Trajectory:
     drive = rd.effects.RigidBacklash(GAP, J, RATIO, restitution)
     return rd.simulate(
-        rd.Plant(SLIDER, [drive, *effects]), [0.0], duration_s=2.0, controller=Ramp(force), integrator=TIGHT,
-        engine=engine, record_period_s=0.01, estimate_error=False,
+        rd.Plant(SLIDER, [drive, *effects]), [0.0], duration_s=2.0, controller=Ramp(force), method=TIGHT,
+        engine=engine, record_every_s=0.01, estimate_error=False,
     )  # fmt: skip
 
 
@@ -72,7 +72,7 @@ def beats(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float) -> None:
     """The same as a second slider on the first one, whose coordinate is δ, between its rigid stops; 1e-10."""
     both = slides(("slide", "base", "cart", MASS), ("play", "cart", "motor", REFLECTED))
-    options = {"duration_s": 3.0, "integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
+    options = {"duration_s": 3.0, "method": TIGHT, "record_every_s": 0.01, "estimate_error": False}
     stops = rd.effects.RigidStops([-np.inf, -GAP], [np.inf, GAP], [0.0, restitution])
     theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=beats, **options)
     ours = rd.simulate(
@@ -91,8 +91,8 @@ def arm_run(engine: str, effects: tuple = (), tolerance: float = 1e-11, period: 
     drive = rd.effects.RigidBacklash([0.01, 0.02], [0.4, 0.05], [2.0, 4.0], [0.6, 0.3], viscous=0.2)
     control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), [300.0, 90.0], [40.0, 9.0], period_s=period)
     return rd.simulate(
-        rd.Plant(ARM, [drive, *effects]), Q, duration_s=0.8, controller=control, engine=engine, record_period_s=0.01,
-        integrator=rd.integrate.Adaptive("DOP853", tolerance, tolerance / 100), estimate_error=False,
+        rd.Plant(ARM, [drive, *effects]), Q, duration_s=0.8, controller=control, engine=engine, record_every_s=0.01,
+        method=rd.integrate.Adaptive("DOP853", tolerance, tolerance / 100), estimate_error=False,
     )  # fmt: skip
 
 
@@ -129,7 +129,7 @@ def test_errors_fall_with_the_tolerance() -> None:
 def test_without_loss_the_energy_of_arm_and_motors_is_kept() -> None:
     """Under gravity alone, e = 1 at both joints: many impacts, and 1e-11 of the energy exchanged."""
     drive = rd.effects.RigidBacklash(0.02, [0.4, 0.05], [2.0, 4.0], 1.0)
-    run = rd.simulate(rd.Plant(ARM, [drive]), Q, [0.4, -1.0], duration_s=1.5, integrator=TIGHT, record_period_s=0.01)
+    run = rd.simulate(rd.Plant(ARM, [drive]), Q, [0.4, -1.0], duration_s=1.5, method=TIGHT, record_every_s=0.01)
     assert sum("strikes" in each.name for each in run.events) > 20
     E = run.ledger.energy + run.ledger.stored["rigid_backlash"]
     np.testing.assert_allclose(E, E[0], atol=1e-11 * run.ledger.exchanged)
@@ -139,12 +139,12 @@ def test_without_loss_the_energy_of_arm_and_motors_is_kept() -> None:
 def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     """From its impact without restitution on, the arm with n² J at its second joint, driven there; 1e-10."""
     law = rd.control.PD(rd.control.hold([0.3, 2.5]), [200.0, 40.0], [30.0, 3.0])
-    options = {"integrator": TIGHT, "estimate_error": False, "controller": law, "engine": engine}
+    options = {"method": TIGHT, "estimate_error": False, "controller": law, "engine": engine}
     drive = rd.effects.RigidBacklash({"joint_2": 0.01}, {"joint_2": 0.05}, {"joint_2": 4.0})
-    run = rd.simulate(rd.Plant(ARM, [drive]), Q, duration_s=0.25, record_period_s=0.1, **options)
+    run = rd.simulate(rd.Plant(ARM, [drive]), Q, duration_s=0.25, record_every_s=0.1, **options)
     (hit,) = run.events
     heavy = ARM.with_(armature={"joint_2": 0.05 * 16})
-    rest = rd.simulate(heavy, hit.q, hit.v, duration_s=0.25 - hit.t, record_period_s=0.0, **options)
+    rest = rd.simulate(heavy, hit.q, hit.v, duration_s=0.25 - hit.t, record_every_s=0.0, **options)
     assert hit.name == "joint_2 strikes the forward end of its backlash"
     np.testing.assert_allclose(run.q[-1], rest.q[-1], atol=1e-10)
     np.testing.assert_allclose(run.a[-1], rest.a[-1], atol=1e-8)

@@ -56,7 +56,7 @@ CASES = [
 
 def setup(effects: Any, scene: tuple[Any, ...]) -> rd.Setup:
     arm, *start, duration_s, controller = scene
-    steps = "rk4", 5e-4, duration_s / 10
+    steps = "RK4", 5e-4, duration_s / 10
     return rd.Setup(rd.Plant(arm, effects), *start, duration_s, controller, *steps, estimate_error=False)
 
 

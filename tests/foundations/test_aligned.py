@@ -37,7 +37,7 @@ def test_arrays_of_zeros_begin_at_cache_lines() -> None:
             assert dtype is object or not x.size or offsets([x]) == [0]
 
 
-@pytest.mark.parametrize("method", ["rk4", "semi_implicit_euler", "gauss_4", "rosenbrock_5"])
+@pytest.mark.parametrize("method", ["RK4", "SemiImplicitEuler", "GaussLegendre4", "Rodas5PFixed"])
 def test_what_each_step_touches_begins_at_cache_lines(method: str) -> None:
     """States, stages and extremes, of many allocations: by chance one in four does."""
     robot = rd.load("planar_2r")

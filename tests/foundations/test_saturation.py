@@ -21,16 +21,16 @@ TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
 
 
 def slide(effects, control, duration_s: float, **options) -> rd.Trajectory:
-    options = {"estimate_error": False, "record_period_s": duration_s} | options
+    options = {"estimate_error": False, "record_every_s": duration_s} | options
     return rd.simulate(rd.Plant(SLIDER, effects), [0.0], duration_s=duration_s, controller=control, **options)
 
 
 @BOTH
-@pytest.mark.parametrize("method", ["rk4", "order_8", "DOP853", "Rosenbrock"])
+@pytest.mark.parametrize("method", ["RK4", "DP8", "DOP853", "Rodas5P"])
 def test_a_growing_command_is_followed_up_to_the_limit(engine: str, method: str) -> None:
     """The command c + d t up to U: a cubic, and a parabola behind t = (U − c)/d; these methods are exact on both."""
     c, d, U, T = 0.3, 2.0, 1.1, 0.7
-    run = slide([rd.effects.EffortLimit(U)], Ramp(c, d), T, integrator=method, engine=engine)
+    run = slide([rd.effects.EffortLimit(U)], Ramp(c, d), T, method=method, engine=engine)
     (reached,) = run.events
     at = (U - c) / d
     assert (reached.name, reached.direction, reached.joint) == ("upper effort limit of slide reached", 1, "slide")
@@ -49,7 +49,7 @@ def test_a_lag_that_reaches_the_limit_behind_it(engine: str, period_s: float) ->
     """u₀ (1 − exp(−t/T)) = U at t = −T ln(1 − U/u₀), also where the command is that of a sampled controller."""
     u0, U, T = 3.0, 1.2, 0.08
     effects = [rd.effects.ActuatorLag(T), rd.effects.EffortLimit(U)]
-    run = slide(effects, Ramp(u0, 0.0, period_s), 0.4, integrator=TIGHT, engine=engine)
+    run = slide(effects, Ramp(u0, 0.0, period_s), 0.4, method=TIGHT, engine=engine)
     (reached,) = run.events
     at = -T * np.log(1 - U / u0)
     assert reached.t == pytest.approx(at, abs=1e-12)
@@ -61,11 +61,11 @@ def test_a_lag_that_reaches_the_limit_behind_it(engine: str, period_s: float) ->
 def test_a_reference_that_jumps_passes_the_limit_at_its_break(engine: str) -> None:
     """From rest at 0 to 2 at t = 0.2: kp (2 − q) − kd v > U at once, and q = U t²/(2 m) until it is left."""
     there = rd.control.PiecewisePolynomial([0.0, 0.2, 1.0], [[[0.0]], [[2.0]]])
-    run = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 0.6, integrator=TIGHT, engine=engine)
+    run = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 0.6, method=TIGHT, engine=engine)
     assert [each.name for each in run.events] == ["upper effort limit of slide reached"]
     assert run.events[0].t == pytest.approx(0.2, abs=np.spacing(0.2))
     assert run.q[-1, 0] == pytest.approx(1.5 / MASS * 0.4**2 / 2, rel=1e-12)
-    whole = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 3.0, integrator=TIGHT, engine=engine)
+    whole = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 3.0, method=TIGHT, engine=engine)
     left = whole.events[1]
     assert left.name == "upper effort limit of slide left"
     assert 10.0 * (2.0 - left.q[0]) - 4.0 * left.v[0] == pytest.approx(1.5, abs=1e-13)
@@ -80,21 +80,21 @@ def control(kind: str) -> tuple[rd.control.Controller, list[rd.Effect]]:
 
 def saturated(kind: str, **options) -> rd.Trajectory:
     controller, effects = control(kind)
-    options = {"estimate_error": False, "record_period_s": 1.0, "engine": "compiled"} | options
+    options = {"estimate_error": False, "record_every_s": 1.0, "engine": "compiled"} | options
     return rd.simulate(rd.Plant(ARM, effects), START, duration_s=1.0, controller=controller, **options)
 
 
 @pytest.mark.parametrize("kind", ["computed_torque", "pid"])
 def test_both_engines_meet_the_same_limits(kind: str) -> None:
-    one, other = (saturated(kind, engine=engine, integrator=TIGHT) for engine in ("interpreted", "compiled"))
+    one, other = (saturated(kind, engine=engine, method=TIGHT) for engine in ("interpreted", "compiled"))
     assert [each.name for each in one.events] == [each.name for each in other.events]
     np.testing.assert_allclose(one.q[-1], other.q[-1], atol=1e-11)
 
 
 def test_the_estimate_sees_the_order_over_a_limit() -> None:
     """A kink that steps end at bounds nothing: the verdict is the order, and the estimate right within 0.3 … 30."""
-    exact = saturated("computed_torque", integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-13))
-    run = saturated("computed_torque", integrator="rk4", step_s=1e-3, estimate_error=True)
+    exact = saturated("computed_torque", method=rd.integrate.Adaptive(rtol=1e-13, atol=1e-13))
+    run = saturated("computed_torque", method="RK4", step_s=1e-3, estimate_error=True)
     assert run.error is not None
     assert run.error.verdict is Verdict.ORDER
     assert 0.3 < run.error.largest / np.abs(run.q[-1] - exact.q[-1]).max() < 30
@@ -110,12 +110,12 @@ def test_limits_that_are_not_reached_change_no_step() -> None:
     assert np.array_equal(far.q, bare.q)
 
 
-@pytest.mark.parametrize("method", ["rk4", "DOP853"])
+@pytest.mark.parametrize("method", ["RK4", "DOP853"])
 def test_what_is_held_between_ticks_is_not_cut(method: str) -> None:
     """The command is constant between ticks, and nothing switches there."""
     gains = rd.control.gains_from(1.0, 12.0)
     sampled = rd.control.ComputedTorque(ARM, REFERENCE, *gains, period_s=0.01)
-    setup = rd.Setup(rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), START, controller=sampled, integrator=method)
+    setup = rd.Setup(rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), START, controller=sampled, method=method)
     run = rd.simulate(setup, estimate_error=False)
     assert setup.finds_events is (method == "DOP853")
     assert run.events == ()
@@ -132,11 +132,11 @@ class Bang(rd.control.Stateless):
         return np.where(q + 2.0 * v < 0.5, 3.0, -3.0)
 
 
-@pytest.mark.parametrize(("method", "engine"), [("rk4", "interpreted"), ("DOP853", "compiled")])
+@pytest.mark.parametrize(("method", "engine"), [("RK4", "interpreted"), ("DOP853", "compiled")])
 def test_a_limit_that_chatters_is_named_and_does_not_hang(method: str, engine: str) -> None:
     """On either side of the line q + 2 v = 0.5 u drives back across it: the motion slides along it."""
-    run = slide([rd.effects.EffortLimit(1.0)], Bang(), 0.4, integrator=method, engine=engine)
-    assert run.outcome.ending == ("finished" if method == "rk4" else "diverged")  # no error control gets over it
+    run = slide([rd.effects.EffortLimit(1.0)], Bang(), 0.4, method=method, engine=engine)
+    assert run.outcome.ending == ("finished" if method == "RK4" else "diverged")  # no error control gets over it
     assert any("effort limit of slide" in each.name and "chatters" in each.name for each in run.events)
 
 
@@ -149,7 +149,7 @@ def test_what_is_held_stays_held_when_a_limit_is_no_longer_looked_for() -> None:
 
     plant = rd.Plant(arm, [rd.effects.EffortLimit([1.0, np.inf]), rd.effects.DryFriction([0.0, 60.0])])
     run = rd.simulate(
-        plant, [0.3, 0.7], duration_s=0.6, controller=drive, integrator="rk4", step_s=0.002,
+        plant, [0.3, 0.7], duration_s=0.6, controller=drive, method="RK4", step_s=0.002,
         estimate_error=False,
     )  # fmt: skip
     assert any("chatters" in each.name for each in run.events)
@@ -159,7 +159,7 @@ def test_what_is_held_stays_held_when_a_limit_is_no_longer_looked_for() -> None:
 def test_sweeps_of_the_limit_are_cut_as_single_runs_are() -> None:
     """A limit of none for the first, and two that are reached."""
     controller, _ = control("computed_torque")
-    plant, options = rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), {"record_period_s": 0.25, "estimate_error": False}
+    plant, options = rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), {"record_every_s": 0.25, "estimate_error": False}
     setup = rd.Setup(plant, START, None, 1.0, controller, **options)
     limits = np.array([[np.inf, np.inf], [18.0, 5.0], [25.0, 8.0]])
     runs = rd.rollouts(setup, params={"effort_limit.limit": limits})

@@ -34,8 +34,9 @@ NO_VALUES = FOR_AUTHORS | {
     "SweepError",
 }  # for types, warned of or raised
 HELD = {  # of values that are made by functions, or held by others
-    "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
-    "Gauss", "Ledger", "Outcome", "Rosenbrock", "Statistics", "TaskDynamics", "WorstCase",
+    "CartesianReference", "CompiledDynamics", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate",
+    "ExplicitRungeKutta",
+    "GaussLegendre", "Ledger", "Outcome", "Rosenbrock", "Statistics", "TaskDynamics", "WorstCase",
 }  # fmt: skip
 NAMES = sorted(CLASSES - NO_VALUES | HELD)
 
@@ -47,7 +48,7 @@ def height(t: float, q: np.ndarray, v: np.ndarray) -> float:
 def sweep_of_pendulum() -> rd.tools.sweeps.SweepResult:
     with TemporaryDirectory() as folder:
         scene = Path(folder, "scene.toml")
-        scene.write_text('robot = "pendulum"\nduration_s = 0.01\nmethod = "rk4"\n', encoding="utf-8")
+        scene.write_text('robot = "pendulum"\nduration_s = 0.01\nmethod = "RK4"\n', encoding="utf-8")
         sweep = rd.tools.sweeps.Sweep(str(scene), 4, {"q0": rd.tools.sweeps.uniform(low=[0.1], high=[0.2])})
         return rd.tools.sweeps.run(sweep, Path(folder, "out"), threads=1, chunk=4)
 
@@ -59,7 +60,7 @@ def values() -> dict[str, Any]:
     options: Any = {
         "duration_s": 0.05,
         "controller": rd.control.PD(PLAN, 10.0, 1.0),
-        "integrator": "rk4",
+        "method": "RK4",
         "step_s": 0.01,
     }
     setup = rd.Setup(plant, Q, **options)
@@ -83,8 +84,8 @@ def values() -> dict[str, Any]:
         rd.control.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
-        rd.control.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.integrate.method("rk4"),
-        rd.integrate.method("gauss_4"), rd.integrate.method("rosenbrock_5"),
+        rd.control.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.integrate.method("RK4"),
+        rd.integrate.method("GaussLegendre4"), rd.integrate.method("Rodas5PFixed"),
         rd.accuracy.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
         rd.tools.proof.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup),
         rd.accuracy.Cost("arm", (), (), (), {}, 1.0, 1.0),
@@ -99,7 +100,7 @@ def values() -> dict[str, Any]:
         rd.tools.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
-    return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}
+    return named | {"CompiledDynamics": rd.compiled(ARM), "CompiledPlant": rd.compiled(plant)}
 
 
 def test_every_public_class_is_looked_at() -> None:

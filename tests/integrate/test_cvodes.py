@@ -1,4 +1,4 @@
-"""Rosenbrock's runs of stiff scenes against an engine that shares nothing with them: CVODES (BDF), as CasADi has it.
+"""Rodas5P's runs of stiff scenes against an engine that shares nothing with them: CVODES (BDF), as CasADi has it.
 
 The equations of the planar arm are written by hand, as in docs/developers/extending.md.
 [Hindmarsh et al., SUNDIALS, 2005]
@@ -39,8 +39,8 @@ def test_rosenbrock_agrees_with_cvodes_in_a_stiff_scene(damping: float, stiffnes
     """On the way to rest, at k/b = 67 and 50 per second. They differ by 2e-13 rad and 6e-12 rad/s."""
     rest = START + np.array([0.1, -0.05])
     plant = rd.Plant(rd.load("planar_2r"), [rd.effects.ViscousFriction(damping), rd.effects.Spring(stiffness, rest)])
-    options = {"duration_s": DURATION, "record_period_s": DURATION, "estimate_error": False}
-    run = rd.simulate(plant, START, integrator=rd.integrate.Adaptive("Rosenbrock", 1e-11, 1e-11), **options)
+    options = {"duration_s": DURATION, "record_every_s": DURATION, "estimate_error": False}
+    run = rd.simulate(plant, START, method=rd.integrate.Adaptive("Rodas5P", 1e-11, 1e-11), **options)
     theirs = by_cvodes(damping, stiffness, rest)
     np.testing.assert_allclose(run.q[-1], theirs[:2], rtol=0, atol=1e-11)
     np.testing.assert_allclose(run.v[-1], theirs[2:], rtol=0, atol=1e-10)

@@ -10,7 +10,7 @@ import pytest
 from flint import arb, fmpq
 
 from robot_dyn.foundations import Ball, midpoint, radius
-from robot_dyn.integrate import ExplicitRungeKutta, Gauss, Integrator, Surd, TimeStepping
+from robot_dyn.integrate import ExplicitRungeKutta, GaussLegendre, Integrator, MoreauJean, Surd
 from robot_dyn.integrate.tableau import Coefficient
 from tests.integrate.test_integrate import ANY_ARITHMETIC, OSCILLATOR, PENDULUM, name_of
 
@@ -35,7 +35,7 @@ def stability_matrix(integrator: Integrator, z: list[list[Fraction]]) -> list[li
             power = times(power, z)
         return total
 
-    if isinstance(integrator, Gauss):  # HW II, theorem IV.3.11: the diagonal Padé approximation of eᶻ
+    if isinstance(integrator, GaussLegendre):  # HW II, theorem IV.3.11: the diagonal Padé approximation of eᶻ
         s = integrator.order // 2
         p = [
             Fraction(factorial(2 * s - k) * factorial(s), factorial(2 * s) * factorial(k) * factorial(s - k))
@@ -44,7 +44,7 @@ def stability_matrix(integrator: Integrator, z: list[list[Fraction]]) -> list[li
         (a, b), (c, d) = polynomial([(-1) ** k * each for k, each in enumerate(p)])
         inverse = [[d / (a * d - b * c), -b / (a * d - b * c)], [-c / (a * d - b * c), a / (a * d - b * c)]]
         return times(inverse, polynomial(p))
-    if isinstance(integrator, TimeStepping):  # Störmer and Verlet: q_m = q + h/2 v, v⁺ = v − h q_m, q⁺ = q_m + h/2 v⁺
+    if isinstance(integrator, MoreauJean):  # Störmer and Verlet: q_m = q + h/2 v, v⁺ = v − h q_m, q⁺ = q_m + h/2 v⁺
         h = z[0][1]
         return [[1 - h * h / 2, h - h**3 / 4], [-h, 1 - h * h / 2]]
     if not isinstance(integrator, ExplicitRungeKutta):  # semi-implicit Euler: v⁺ = v − h q, q⁺ = q + h v⁺

@@ -51,7 +51,7 @@ def measured_order(name: str, problem: Problem) -> float:
 
     Below order 6 in float64 with 32 to 256 steps: fine enough for the leading term to rule, and errors above 1e-11.
     From order 6 in longdouble with 4 to 16 steps: errors of 1e-6 to 1e-14, above the 1e-16 that the float64
-    coefficients of order_8 leave; float64 itself would have rounded away the last of them.
+    coefficients of DP8 leave; float64 itself would have rounded away the last of them.
     Order 5 in longdouble, too, where differences for a Jacobian are right to 1e-13.
     """
     integrator = method(name)

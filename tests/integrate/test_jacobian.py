@@ -100,7 +100,7 @@ def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
-    assert "jacobian" not in machine_code(equation, rd.integrate.method("rk4")).code.programs
+    assert "jacobian" not in machine_code(equation, rd.integrate.method("RK4")).code.programs
     assert machine_code(equation).in_python.jacobian == 0
     assert "jacobian" in machine_code(equation, jacobian=True).code.programs
 
@@ -125,11 +125,11 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
 
 
 def test_differences_are_named_in_the_summary() -> None:
-    options = START | {"duration_s": 0.02, "step_s": 0.01, "integrator": "rosenbrock_5", "estimate_error": False}
+    options = START | {"duration_s": 0.02, "step_s": 0.01, "method": "Rodas5PFixed", "estimate_error": False}
     labels = [rd.simulate(ARM, **options, engine=engine).statistics.engine for engine in ("interpreted", "compiled")]
     assert labels[0] == "interpreted (Jacobian by differences)"
     assert "differences" not in labels[1]
-    assert "differences" not in rd.simulate(ARM, **options | {"integrator": "rk4"}).statistics.engine
+    assert "differences" not in rd.simulate(ARM, **options | {"method": "RK4"}).statistics.engine
 
 
 @pytest.mark.parametrize("end", [0.3 + 0.1, 0.3 - 0.1, 0.3 + 1e-7])

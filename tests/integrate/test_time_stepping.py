@@ -7,10 +7,11 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
-from robot_dyn.integrate import RightSide, TimeStepping
+from robot_dyn.integrate import MoreauJean, RightSide
 from robot_dyn.integrate.integrator import States
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.integrate.time_stepping import problem_rows
+from robot_dyn.simulation import DoubtKind
 from tests.campaigns.estimates.scenes import arms
 from tests.foundations.test_convex import minimum, problem
 from tests.long import long
@@ -19,7 +20,7 @@ ENGINES = ["interpreted", "compiled"]
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
 ARM = rd.load("planar_2r")
 G = 9.80665
-FIXED = {"integrator": "time_stepping", "estimate_error": False}
+FIXED = {"method": "MoreauJean", "estimate_error": False}
 
 
 def panda() -> rd.Robot:
@@ -30,7 +31,7 @@ def panda() -> rd.Robot:
 @pytest.mark.parametrize("load", [1.0, *long([0.3])])
 def test_what_friction_holds_stays_for_any_number_of_steps(load: float) -> None:
     """A block on a rail for an hour, with the load at its limit to the last bit too: 0.0."""
-    plant, options = rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), {"record_period_s": 900.0} | FIXED
+    plant, options = rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), {"record_every_s": 900.0} | FIXED
     run = rd.simulate(plant, [0.25], duration_s=3600.0, step_s=1e-3, engine="compiled", **options)
     assert run.statistics.steps == 3_600_000
     assert (run.q == 0.25).all()
@@ -61,7 +62,7 @@ def test_the_actuation_of_every_step_is_seen_by_both_engines(period_s: float) ->
     control = rd.control.PD(rd.control.hold([0.4, -0.2]), [30.0, 20.0], [3.0, 2.0], period_s=period_s)
     runs = [
         rd.simulate(
-            plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_period_s=0.0, controller=control,
+            plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_every_s=0.0, controller=control,
             engine=engine, **FIXED,
         )
         for engine in ENGINES
@@ -120,7 +121,7 @@ def test_without_what_holds_it_is_the_method_of_stormer_and_verlet() -> None:
     """Of order 2 for forces of the position, and reversible: a pendulum there and back, to rounding."""
     pendulum = ARM.with_(lock={ARM.joint_names[1]: 0.0})
     errors = []
-    exact = rd.simulate(pendulum, [0.4], duration_s=1.0, integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)).q[-1]
+    exact = rd.simulate(pendulum, [0.4], duration_s=1.0, method=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)).q[-1]
     for h in (2e-3, 1e-3):
         run = rd.simulate(pendulum, [0.4], duration_s=1.0, step_s=h, **FIXED)
         errors.append(np.abs(run.q[-1] - exact).max())
@@ -141,12 +142,10 @@ def test_its_limit_is_that_of_the_events() -> None:
 
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.1), rd.effects.DryFriction(levels)])
     given = {"duration_s": 2.0, "controller": drive, "estimate_error": False, "engine": "compiled"}
-    exact = rd.simulate(plant, q0, integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-8), record_period_s=0.1, **given)
+    exact = rd.simulate(plant, q0, method=rd.integrate.Adaptive(rtol=1e-8, atol=1e-8), record_every_s=0.1, **given)
     steps = 4e-3 / 2.0 ** np.arange(6)
     errors = [
-        np.abs(
-            rd.simulate(plant, q0, integrator="time_stepping", step_s=h, record_period_s=0.1, **given).q - exact.q
-        ).max()
+        np.abs(rd.simulate(plant, q0, method="MoreauJean", step_s=h, record_every_s=0.1, **given).q - exact.q).max()
         for h in steps
     ]
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1, abs=0.15)
@@ -199,7 +198,7 @@ def test_a_step_solves_problems_that_newtons_method_does_not() -> None:
     """Of 300 random problems side by side: where places still change after its steps the active set takes over."""
     rng, n, runs = np.random.default_rng(10), 3, 300
     given = [each for k in range(4000) if len((each := problem(rng, k % 2 == 1))[1]) == n][:runs]
-    rows, stepper = problem_rows(n), TimeStepping().stepper(None, 2 * n + 1, n, 3 * n + 1, runs)
+    rows, stepper = problem_rows(n), MoreauJean().stepper(None, 2 * n + 1, n, 3 * n + 1, runs)
     m, lost = 2 * n + 1, np.zeros(runs, np.int64)
     y, after = np.zeros((m, runs)), np.zeros((m, runs))
 
@@ -224,17 +223,17 @@ def test_a_step_solves_problems_that_newtons_method_does_not() -> None:
 
 def test_it_estimates_no_error_and_finds_no_events() -> None:
     plant = rd.Plant(ARM, HELD["levels"])
-    run = rd.simulate(plant, [0.3, 0.2], duration_s=0.1, step_s=1e-3, integrator="time_stepping")
-    assert "compare it with step_s / 4" in run.error.note
+    run = rd.simulate(plant, [0.3, 0.2], duration_s=0.1, step_s=1e-3, method="MoreauJean")
+    assert run.error.ends_early.kind is DoubtKind.NO_ORDER_OF_IMPACTS
     event = rd.Event(lambda t, q, v: q[0] - 0.25)
-    with pytest.raises(QueryError, match="time_stepping are not cut; take integrator='DOP853'"):
-        rd.simulate(plant, [0.3, 0.2], step_s=1e-3, integrator="time_stepping", events=[event])
+    with pytest.raises(QueryError, match="MoreauJean are not cut; take method='DOP853'"):
+        rd.simulate(plant, [0.3, 0.2], step_s=1e-3, method="MoreauJean", events=[event])
     with pytest.raises(QueryError, match="1e-06 beyond its upper stop"):
         rd.simulate(
-            rd.Plant(ARM, [rd.effects.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, integrator="time_stepping"
+            rd.Plant(ARM, [rd.effects.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, method="MoreauJean"
         )
     with pytest.raises(QueryError, match=r"cuts=False: .* where steps must end"):
-        rd.rollouts(plant, [0.3, 0.2], integrator="rk4", step_s=1e-3, cuts=False)
+        rd.rollouts(plant, [0.3, 0.2], method="RK4", step_s=1e-3, cuts=False)
 
 
 def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -246,13 +245,13 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
     plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, 2.0, 0.5)])
     run = rd.simulate(plant, [0.4], duration_s=2.0)
     assert run.outcome.ending == "finished"
-    assert run.statistics.method == "time_stepping"
+    assert run.statistics.method == "MoreauJean"
     (said,) = [each for each in run.remarks if each.kind == "events_accumulate"]
     assert "made by time stepping with steps of 0.001 s" in said.remedy
     assert abs(run.q[-1, 0]) <= 3e-3  # of a step at the velocity of the first impact
-    named = rd.simulate(plant, [0.4], duration_s=2.0, integrator="DOP853")
+    named = rd.simulate(plant, [0.4], duration_s=2.0, method="DOP853")
     assert named.outcome.ending == "diverged"
-    assert "take integrator='time_stepping'" in named.outcome.text
+    assert "take method='MoreauJean'" in named.outcome.text
 
 
 def test_a_run_far_beyond_its_stable_step_ends_as_diverged() -> None:
@@ -260,7 +259,7 @@ def test_a_run_far_beyond_its_stable_step_ends_as_diverged() -> None:
     robot, q = rd.load("panda"), np.full(8, 0.3)
     law = rd.control.PDGravity(robot, rd.control.hold(q), 1e3, 50.0)
     run = rd.simulate(
-        robot, q + 1e-3, controller=law, duration_s=0.5, integrator="time_stepping", step_s=0.01, engine="interpreted",
+        robot, q + 1e-3, controller=law, duration_s=0.5, method="MoreauJean", step_s=0.01, engine="interpreted",
         estimate_error=False,
     )  # fmt: skip
     assert run.outcome.ending == "diverged" and run.outcome.t < 0.5

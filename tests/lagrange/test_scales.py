@@ -101,7 +101,7 @@ def test_the_coriolis_matrix_is_that_of_300_bits() -> None:
 def test_kernels_of_a_chain_from_a_kilometre_to_a_micrometre_pass_their_check() -> None:
     """A kernel as right as the robot is handed out, of C and of what is solved with light links."""
     robot = long_chain()
-    fast = rd.Compiled(robot, cache=False)
+    fast = rd.compiled(robot, cache=False)
     q, v, a = general(robot, 2)
     size = magnitudes(rd.Lagrangian(robot).linkage, q)
     assert np.all(np.abs(fast.C(q, v) - robot.C(q, v)) <= 1e-15 * size.C(v))
@@ -115,7 +115,7 @@ def test_a_kernel_of_a_very_light_tip_is_checked_where_it_answers(moment: str) -
     """Torques of 1 N m would turn such a tip at more than 1e10 rad/s², which a kernel declines and does not write."""
     text = chain(body(2, moments=0.1), body("1e-6", moments=moment), at=("0 0 0", "1 0 0"))
     robot = rd.Robot(check(text.encode(), "light"))
-    fast = rd.Compiled(robot, cache=False)
+    fast = rd.compiled(robot, cache=False)
     q, v, a = np.random.default_rng(6).normal(size=(3, 20, 2))
     tau = robot.inverse_dynamics(q, v, a)
     for rows in (slice(0, 1), slice(0, 20)):

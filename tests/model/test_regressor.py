@@ -19,7 +19,7 @@ ENGINES = {
     "Robot": lambda robot: robot,
     "Lagrangian": rd.Lagrangian,
     "longdouble": lambda robot: rd.Lagrangian(robot, np.longdouble),
-    "Compiled": lambda robot: rd.Compiled(robot, cache=False),
+    "compiled": lambda robot: rd.compiled(robot, cache=False),
 }
 
 
@@ -38,7 +38,7 @@ def test_torques_are_the_regressor_times_the_parameters(name: str, engine: str) 
     q, v, a = general(robot, 5)
     Y, theta = asked.regressor(q, v, a), asked.inertial_parameters
     terms = np.abs(Y) @ np.abs(theta) + 0.3 * np.abs(a)
-    expected = getattr(asked, "robot", robot).inverse_dynamics(q, v, a)  # of Compiled with its right angles
+    expected = getattr(asked, "robot", robot).inverse_dynamics(q, v, a)  # of a compiled robot with its right angles
     assert np.all(np.abs(Y @ theta + 0.3 * a - expected) <= 1e-13 * terms)
 
 
@@ -49,10 +49,10 @@ def test_all_implementations_give_one_regressor(name: str) -> None:
     own, (q, v, a) = rd.Lagrangian(robot), general(robot, 6)
     allowed = 1e-13 * floored(magnitudes(own.linkage, q).regressor(v, a))
     expected = robot.regressor(q, v, a)
-    assert own.body_names == robot.body_names == rd.Compiled(robot).body_names
+    assert own.body_names == robot.body_names == rd.compiled(robot).body_names
     for Y in (own.regressor(q, v, a), regressor(own.linkage, q, v, a)):
         assert np.all(np.abs(Y - expected) <= allowed)
-    fast = rd.Compiled(robot, cache=False)
+    fast = rd.compiled(robot, cache=False)
     assert np.all(np.abs(fast.regressor(q, v, a) - fast.robot.regressor(q, v, a)) <= allowed)
     size = 1e-14 * np.abs(robot.inertial_parameters).max()
     assert np.allclose(own.inertial_parameters, robot.inertial_parameters, rtol=0, atol=size)

@@ -56,7 +56,7 @@ AXES |= {"local_world_aligned": pin.LOCAL_WORLD_ALIGNED, "local": pin.LOCAL} | {
 
 
 ENGINES = [("ur5", rd.load("ur5"), 1e-15)]
-ENGINES += [("skew_tree", make(rd.load("skew_tree")), 1e-12) for make in (rd.Robot.with_, rd.Lagrangian, rd.Compiled)]
+ENGINES += [("skew_tree", make(rd.load("skew_tree")), 1e-12) for make in (rd.Robot.with_, rd.Lagrangian, rd.compiled)]
 
 
 @pytest.mark.parametrize(("arm", "asked", "rounding"), ENGINES, ids=lambda x: type(x).__name__)

@@ -207,7 +207,7 @@ def test_couplings_are_read_only():
 def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implementation: str) -> None:
     """Half of 3e6 rad is known to 1e-9 rad, half of 1e15 rad to 0.1 rad, with as few digits of M; balls know both."""
     robot = rd.load("mimic_chain")
-    engine = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}[
+    engine = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.compiled(robot)}[
         implementation
     ]
     q = np.full((19, 2), 0.3)
@@ -217,7 +217,7 @@ def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implem
         engine.M(q)
     with pytest.raises(OverflowedError, match="positions of mimic joints are not exact"):
         engine.M(q[7])
-    M = engine.M(q, errors="nan")
+    M = engine.nan_rows.M(q)
     assert np.isnan(M[7]).all() and np.isfinite(np.delete(M, 7, axis=0)).all()
     assert_allclose(M[5], rd.accuracy.midpoint(truth.M(q[5])), rtol=1e-7)
     assert np.isfinite(rd.accuracy.midpoint(truth.M(q[7]))).all()
@@ -232,5 +232,5 @@ def test_far_out_a_joint_that_nothing_rounds_is_where_it_is(name: str) -> None:
     allowed = 64 * robot.n * 2.0**-53  # two implementations, 32 n u each
     expected = robot.M(q)
     size = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
-    for engine in (rd.Lagrangian(robot), rd.Compiled(robot)):
+    for engine in (rd.Lagrangian(robot), rd.compiled(robot)):
         assert (np.abs(engine.M(q) - expected) / size).max() <= allowed

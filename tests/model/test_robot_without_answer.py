@@ -169,19 +169,12 @@ def test_products_of_four_numbers_that_overflow_are_refused(name: str, follower:
     for state in (given, [x.tolist() for x in given]):
         with pytest.raises(OverflowedError):
             getattr(robot, name)(*state)
-        assert np.isnan(getattr(robot, name)(*state, errors="nan")).all()
-
-
-@pytest.mark.parametrize("name", ["kinetic_energy", "momentum", "jacobian"])
-def test_a_wrong_way_with_errors_is_refused_at_one_state_as_well(name: str) -> None:
-    robot, state = rd.load("ur5"), np.full(6, 0.3)
-    with pytest.raises(rd.RobotDynError, match="errors"):
-        getattr(robot, name)(state, "tool0" if name == "jacobian" else state, errors="nonsense")
+        assert np.isnan(getattr(robot.nan_rows, name)(*state)).all()
 
 
 ARM = rd.load("ur5")
 NEAR = np.array([0.3, -0.2, 0.5, 0.7, -0.4, 0.9])
-NARROW = {"Lagrangian": rd.Lagrangian(ARM, np.float32), "machine code": rd.Compiled(ARM, dtype="float32")}
+NARROW = {"Lagrangian": rd.Lagrangian(ARM, np.float32), "machine code": rd.compiled(ARM, dtype="float32")}
 # what cannot be held, by what cannot hold it: the distance to the nearest number is 2⁻¹¹ and more
 HIDDEN: dict[str, tuple[Any, Any]] = {
     "float64 in float32": (NARROW["Lagrangian"], NEAR + 1e12),
@@ -205,7 +198,7 @@ def test_a_position_that_rounding_hides_is_refused(case: str) -> None:
 def test_in_a_batch_the_row_that_rounding_hides_has_no_answer(name: str) -> None:
     q = np.tile(NEAR, (20, 1))
     q[7, 2] = 1e12 + 0.3
-    answer = NARROW[name].M(q, errors="nan")
+    answer = NARROW[name].nan_rows.M(q)
     assert np.isnan(answer[7]).all()
     assert np.array_equal(np.delete(answer, 7, axis=0), NARROW[name].M(np.delete(q, 7, axis=0)))
     with pytest.raises(OverflowedError, match="in row 7 of the batch"):
@@ -226,11 +219,11 @@ def test_a_float32_is_one_angle_however_large(name: str, far: float) -> None:
 @pytest.mark.parametrize("rows", [0, 1, 20])
 def test_a_time_that_rounding_hides_is_refused_by_machine_code(rows: int) -> None:
     """float32 tells 1e9 s to 64 s; what it holds, 2^30 s, it takes."""
-    plant = rd.Compiled(rd.Plant(ARM, [Push(lambda t, q, v: 0 * v + t)]), dtype="float32")
+    plant = rd.compiled(rd.Plant(ARM, [Push(lambda t, q, v: 0 * v + t)]), dtype="float32")
     q = np.tile(NEAR, (rows, 1) if rows else 1).astype(np.float32)
 
     def torque(t: float) -> Any:
-        return plant.torque(np.full(rows, t) if rows else t, q, 0 * q)
+        return plant.torque(q, 0 * q, t=np.full(rows, t) if rows else t)
 
     with pytest.raises(OverflowedError, match="t is so large that float32 does not resolve"):
         torque(1e9 + 0.5)
@@ -263,7 +256,7 @@ def test_states_that_are_not_finite_leave_the_others_their_answers(engine: Any, 
     ) as told:
         getattr(engine, method)(*bad, *frame)
     assert told.value.row == (1,)
-    answer = getattr(engine, method)(*bad, *frame, errors="nan")
+    answer = getattr(engine.nan_rows, method)(*bad, *frame)
     lost = np.isin(np.arange(rows), (1, rows - 1))
     assert np.isnan(answer[lost]).all()
     np.testing.assert_allclose(answer[~lost], expected[~lost], rtol=0, atol=1e-13 * np.abs(expected).max())
@@ -277,7 +270,7 @@ def test_a_state_that_overflows_is_told_by_its_row(engine: Any, method: str) -> 
     given[1][2, 3] = 1e180 if method != "C" else 1.5e308
     with pytest.raises(OverflowedError, match=r"so large that the result overflows in row \(2, 3\) of the batch"):
         getattr(engine, method)(*given)
-    answer = getattr(engine, method)(*given, errors="nan")
+    answer = getattr(engine.nan_rows, method)(*given)
     assert np.isnan(answer[2, 3]).all()
     assert np.isfinite(np.delete(answer.reshape(24, -1), 15, axis=0)).all()
 
@@ -322,15 +315,44 @@ def test_a_refused_batch_leaves_out_as_it_was(rows: int, wrong: float) -> None:
     with pytest.raises(QueryError):
         fast.inverse_dynamics(state["q"], state["v"], state["a"], out=out)
     assert_array_equal(out, 7.0)
-    assert fast.inverse_dynamics(state["q"], state["v"], state["a"], out=out, errors="nan") is out
+    assert fast.nan_rows.inverse_dynamics(state["q"], state["v"], state["a"], out=out) is out
     assert np.isnan(out[-1]).all()
     assert np.isfinite(out[:-1]).all()
 
 
 @every_engine
-def test_a_way_to_deal_with_errors_is_one_of_two(engine: Any) -> None:
-    with pytest.raises(QueryError, match="errors must be 'raise' or 'nan', got 'ignore'"):
-        engine.M(np.ones((2, 6)), errors="ignore")
+def test_nan_rows_hide_no_error_of_the_query_itself(engine: Any) -> None:
+    """Only a state can be without a result, also a single one; wrong shapes and names are errors."""
+    assert (engine.nan_rows.n, engine.nan_rows.joint_names) == (6, UR5.joint_names)
+    assert np.isnan(engine.nan_rows.M(np.full(6, np.nan))).all()
+    with pytest.raises(QueryError, match="q must have shape"):
+        engine.nan_rows.M(np.ones((2, 5)))
+    with pytest.raises(QueryError, match="nowhere"):
+        engine.nan_rows.jacobian(np.full(6, np.nan), "nowhere")
+    with pytest.raises(QueryError, match="read-only"):
+        out = np.zeros((2, 6, 6))
+        out.flags.writeable = False
+        engine.nan_rows.M(np.ones((2, 6)), out=out)
+
+
+def test_compiled_plants_and_derivatives_have_nan_rows() -> None:
+    """The other rows are those of a batch without bad ones, to 1e-13 of the largest."""
+    fast = compiled("ur5")
+    plant = rd.compiled(rd.Plant(UR5, [rd.effects.ViscousFriction(0.3)]))
+    q, v, _, tau = batch_of(20).values()
+    bad = q.copy()
+    bad[3] = np.nan
+    for engine, name in ((fast, "forward_dynamics_derivatives"), (plant, "forward_dynamics")):
+        with pytest.raises(NotFiniteError):
+            getattr(engine, name)(bad, v, tau)
+        ours, theirs = getattr(engine.nan_rows, name)(bad, v, tau), getattr(engine, name)(q, v, tau)
+        if isinstance(theirs, tuple):
+            ours, theirs = np.stack(ours, axis=1), np.stack(theirs, axis=1)
+        assert np.isnan(ours[3]).all()
+        np.testing.assert_allclose(
+            np.delete(ours, 3, axis=0), np.delete(theirs, 3, axis=0), rtol=0, atol=1e-13 * np.abs(theirs).max()
+        )
+    assert np.isnan(plant.nan_rows.M(bad)[3]).all() and plant.nan_rows.engine is plant.engine
 
 
 @pytest.mark.parametrize(
@@ -345,7 +367,7 @@ def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding:
     own = rd.Lagrangian(robot, dtype)
     with pytest.raises(UndecidedError, match=f"not decided: rounding of {rounding} hides whether joint 'j"):
         own.forward_dynamics(q, v, tau)
-    assert own.arithmetic.asarray(own.forward_dynamics(np.stack([q, q]), v, tau, errors="nan")).shape == (2, n)
+    assert own.arithmetic.asarray(own.nan_rows.forward_dynamics(np.stack([q, q]), v, tau)).shape == (2, n)
     answer = rd.Lagrangian(robot, enough).forward_dynamics(q, v, tau)
     assert robot.joint_without_inertia is None
     if isinstance(enough, rd.accuracy.Ball):

@@ -80,7 +80,7 @@ def test_what_a_scene_does_not_name_does_not_act(write) -> None:
     """Without gravity and effects the arm keeps its kinetic energy; N is 0 at any state."""
     setup = rd.read_scene(write(SCENE))
     assert setup.plant.effects == ()
-    np.testing.assert_array_equal(setup.plant.N(0.0, [0.3, 0.4], [1.0, 2.0]), [0.0, 0.0])
+    np.testing.assert_array_equal(setup.plant.N([0.3, 0.4], [1.0, 2.0], t=0.0), [0.0, 0.0])
     run = rd.simulate(setup)
     np.testing.assert_allclose(run.ledger.energy, run.ledger.energy[0], rtol=1e-9)
 
@@ -146,8 +146,8 @@ def same_motion(write, kind: str, text: str, by_hand: rd.Plant) -> None:
     plant = rd.read_scene(path).plant
     assert [type(each) for each in plant.effects] == [type(each) for each in by_hand.effects]
     q, v, u = np.random.default_rng(3).uniform(1.0, 4.0, (3, plant.dynamics.n))
-    expected = by_hand.forward_dynamics(0.05, q, v, u)
-    np.testing.assert_array_equal(plant.forward_dynamics(0.05, q, v, u), expected)
+    expected = by_hand.forward_dynamics(q, v, u, t=0.05)
+    np.testing.assert_array_equal(plant.forward_dynamics(q, v, u, t=0.05), expected)
 
 
 @pytest.mark.parametrize("kind", ["pid", "computed_torque", *long(["pd", "pd_gravity", "feed_forward"])])
@@ -156,7 +156,7 @@ def test_every_joint_controller_follows_its_plan(write, kind: str) -> None:
     text = SCENE.replace("0.1", "1.0", 1) + PD.replace('"pd"', f'"{kind}"')
     run = rd.simulate(rd.read_scene(write(text)))
     np.testing.assert_allclose(run.q[-1], [1.0, 0.5], atol=0.05)
-    assert run.tracking_error is not None
+    assert run.rms_tracking_error is not None
 
 
 def test_explanation_names_each_term_and_its_source(write) -> None:
@@ -295,7 +295,7 @@ def test_operational_space_takes_gains_of_the_frame(write) -> None:
 
 HEAD = """robot = "planar_2r"
 duration_s = 0.1
-method = "rk4"
+method = "RK4"
 step_s = 1e-3
 estimate_error = false
 engine = "interpreted"

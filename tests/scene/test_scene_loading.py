@@ -98,11 +98,11 @@ DRY = '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0'
 @pytest.mark.parametrize(
     ("stated", "at", "key"),
     [
-        ({"duration_s = 1.0": 'duration_s = 1e9\nmethod = "rk4"\nstep_s = 1e-3'}, 4, "step_s"),
+        ({"duration_s = 1.0": 'duration_s = 1e9\nmethod = "RK4"\nstep_s = 1e-3'}, 4, "step_s"),
         ({"duration_s = 1.0": "duration_s = 1e18"}, 2, "duration_s"),
         ({"duration_s = 1.0": "duration_s = 1.0\naccuracy = 1e-6\nestimate_error = false"}, 3, "accuracy"),
         ({"gravity": "rigid_stops", "#": "lower_rad = 0.5\nupper_rad = 0.6"}, 3, "start"),
-        ({"duration_s = 1.0": 'duration_s = 1.0\nmethod = "gauss_4"', "#": DRY}, 8, "effect 2 (dry_friction)"),
+        ({"duration_s = 1.0": 'duration_s = 1.0\nmethod = "GaussLegendre4"', "#": DRY}, 8, "effect 2 (dry_friction)"),
         ({"#": '[control]\nkind = "pd"\nkp = 1.0\nkd = 1.0\nperiod_s = 1e-12'}, 7, "control"),
     ],
 )  # fmt: skip

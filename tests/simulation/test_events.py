@@ -27,7 +27,7 @@ def tossed(rise: float, excess: float, k: float, after: float, **options) -> tup
     v0 = G * rise
     stop = v0**2 / (2 * G) - excess
     plant = rd.Plant(BALL, rd.effects.joint_stops([-50.0], [stop], k, 0.0))
-    options = {"integrator": TIGHT, "estimate_error": False} | options
+    options = {"method": TIGHT, "estimate_error": False} | options
     run = rd.simulate(plant, [0.0], [v0], duration_s=rise + after, **options)
     left = v0**2 - 2 * G * stop
     if left <= 0:
@@ -45,7 +45,7 @@ def test_grazed_and_struck_stops_are_met_as_in_closed_form(seed: int) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(30):
         excess, k = 10 ** rng.uniform(-6, -2), 10 ** rng.uniform(4, 9)
-        run, exact = tossed(rng.uniform(0.2, 0.6), excess, k, rng.uniform(0.1, 0.3), record_period_s=1.0)
+        run, exact = tossed(rng.uniform(0.2, 0.6), excess, k, rng.uniform(0.1, 0.3), record_every_s=1.0)
         assert [each.direction for each in run.events] == [1, -1], (excess, k)
         assert abs(run.q[-1, 0] - exact) < 1e-11, (excess, k)
 
@@ -53,7 +53,7 @@ def test_grazed_and_struck_stops_are_met_as_in_closed_form(seed: int) -> None:
 def test_a_run_that_ends_far_from_its_start_has_an_estimate() -> None:
     """Of fixed steps that are cut: how far a joint turns in a step is told from its path, which begins at the start."""
     plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), rd.effects.joint_stops([-9.0, -9.0], [9.0, 9.0]))
-    run = rd.simulate(plant, [0.1, 0.2], [3.0, 0.5], duration_s=2.5, integrator="rk4", step_s=0.01)
+    run = rd.simulate(plant, [0.1, 0.2], [3.0, 0.5], duration_s=2.5, method="RK4", step_s=0.01)
     assert np.abs(run.q[-1] - run.q[0]).max() > np.pi
     assert run.error is not None
     assert not run.error.note
@@ -63,7 +63,7 @@ def test_near_misses_are_no_events() -> None:
     """1e-12 … 1e-4 m below a stop of 1e8 N/m."""
     rng = np.random.default_rng(3)
     for _ in range(20):
-        run, exact = tossed(rng.uniform(0.2, 0.6), -(10 ** rng.uniform(-12, -4)), 1e8, 0.2, record_period_s=1.0)
+        run, exact = tossed(rng.uniform(0.2, 0.6), -(10 ** rng.uniform(-12, -4)), 1e8, 0.2, record_every_s=1.0)
         assert run.events == ()
         assert abs(run.q[-1, 0] - exact) < 1e-12
 
@@ -86,7 +86,7 @@ def test_a_function_of_the_users_own_is_an_event_where_it_vanishes(engine: str, 
     """The apex, and a height of 1 m on the way up and down: closed forms to rounding of a parabola."""
     apex = rd.Event(lambda t, q, v: v[0], name="apex")
     falls = rd.Event(lambda t, q, v: q[0] - 1.0, direction=-1, name="falls")
-    options = {"engine": engine, "integrator": method, "estimate_error": False, "events": [apex, falls]}
+    options = {"engine": engine, "method": method, "estimate_error": False, "events": [apex, falls]}
     run = rd.simulate(BALL, [0.0], [5.0], duration_s=0.9, **options)
     assert [(each.name, each.direction) for each in run.events] == [("apex", -1), ("falls", -1)]
     assert run.events[0].t == pytest.approx(5 / G, abs=1e-14)
@@ -98,7 +98,7 @@ def test_a_terminal_event_ends_the_run_there(engine: str) -> None:
     """Run until the arm hangs at rest to 1 mrad/s: the run is finished, its last sample is the event."""
     slow = rd.Event(lambda t, q, v: v[0] ** 2 + v[1] ** 2 - 1e-6, direction=-1, terminal=True, name="at rest")
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(8.0)])
-    run = rd.simulate(plant, [0.3, 0.4], duration_s=60.0, engine=engine, events=[slow], record_period_s=0.1)
+    run = rd.simulate(plant, [0.3, 0.4], duration_s=60.0, engine=engine, events=[slow], record_every_s=0.1)
     assert run.outcome.ending == "finished"
     assert run.outcome.t == run.t[-1] == run.events[-1].t < 60
     assert "at rest" in run.outcome.text
@@ -134,7 +134,7 @@ def above(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def test_events_that_never_occur_do_not_change_the_steps() -> None:
     """Stops out of reach: the same steps, the same bits, and no evaluation more."""
-    options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 1.0, "estimate_error": False, "record_period_s": 1.0}
+    options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 1.0, "estimate_error": False, "record_every_s": 1.0}
     bare = rd.simulate(ARM, **options, engine="interpreted")
     far = rd.simulate(rd.Plant(ARM, rd.effects.joint_stops([-9.0, -9.0], [9.0, 9.0])), **options, engine="interpreted")
     assert far.statistics.evaluations == bare.statistics.evaluations
@@ -144,11 +144,11 @@ def test_events_that_never_occur_do_not_change_the_steps() -> None:
 def test_a_start_on_a_stop_and_one_within_it() -> None:
     """Resting on a lower stop exactly, weight sinks in by m g / k; a start within is in contact from the first step."""
     stops = rd.effects.joint_stops([0.0], [5.0], 1e4, 0.0)
-    on = rd.simulate(rd.Plant(BALL, stops), [0.0], duration_s=0.1, integrator=TIGHT)
+    on = rd.simulate(rd.Plant(BALL, stops), [0.0], duration_s=0.1, method=TIGHT)
     omega = 100.0
     exact = -G / omega**2 * (1 - np.cos(omega * on.t))
     assert np.abs(on.q[:, 0] - exact).max() < 1e-11
-    sunk = rd.simulate(rd.Plant(BALL, stops), [-G / omega**2], duration_s=0.1, integrator=TIGHT)
+    sunk = rd.simulate(rd.Plant(BALL, stops), [-G / omega**2], duration_s=0.1, method=TIGHT)
     assert np.abs(sunk.q[:, 0] + G / omega**2).max() < 1e-13
     assert sunk.events == ()
 
@@ -157,7 +157,7 @@ def test_two_joints_that_meet_their_stops_at_once() -> None:
     """Two equal blocks on two rails: both events, at one time, and equal motion afterwards."""
     pair = slides(("j1", "base", "b1", 1.0), ("j2", "base", "b2", 1.0), axes=("0 0 1",) * 2)
     plant = rd.Plant(pair, rd.effects.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0))
-    run = rd.simulate(plant, [0.0, 0.0], duration_s=1.0, integrator=TIGHT)
+    run = rd.simulate(plant, [0.0, 0.0], duration_s=1.0, method=TIGHT)
     times = [each.t for each in run.events]
     assert len(times) >= 4
     assert times[0] == pytest.approx(np.sqrt(1.0 / G), abs=1e-13)
@@ -208,7 +208,7 @@ def test_meaningless_events_are_refused(make, message: str) -> None:
 def test_a_run_that_takes_more_steps_than_was_guessed_goes_on_in_machine_code() -> None:
     """Its length is guessed by its duration; a stiff damper takes many more steps. The count decides, not a clock."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(3e4)])
-    run = rd.simulate(plant, [0.3, 0.4], duration_s=0.05, estimate_error=False, integrator="DOP853")
+    run = rd.simulate(plant, [0.3, 0.4], duration_s=0.05, estimate_error=False, method="DOP853")
     assert run.statistics.evaluations > 20_000
     assert run.statistics.engine == "compiled"
     other = rd.Plant(
@@ -231,7 +231,7 @@ def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytes
     count = [0.0]  # evaluations of runs before, which other tests may have made
     monkeypatch.setattr("robot_dyn.simulation.compiled.choice.interpreted_before", lambda *_: count)
     tight = rd.integrate.Adaptive(rtol=3e-14, atol=1e-15)
-    run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=tight)
+    run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, method=tight)
     assert run.statistics.evaluations > 500
     assert run.statistics.engine == "interpreted (not here)"
     assert len(tried) == 1

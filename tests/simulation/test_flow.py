@@ -69,10 +69,10 @@ def plant() -> rd.Plant:
 
 
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
-@pytest.mark.parametrize("method", ["auto", "rk4"])
+@pytest.mark.parametrize("method", ["auto", "RK4"])
 def test_simulate_enters_its_stages_in_one_order(engine: str, method: str) -> None:
     """A setup, its engine, its observer, the run, a verdict on its speeds, the error estimate; then values are read."""
-    options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "engine": engine, "integrator": method}
+    options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "engine": engine, "method": method}
     rd.simulate(plant(), Q, **options)
     seen = entries(lambda: rd.simulate(plant(), Q, **options))
     called = [each for each in seen if each.caller == "simulate.py" and each.room in STAGES]
@@ -86,10 +86,10 @@ PROTOCOL = ("MachineCode.", "Interpreted.", "choose", "interpreted.<locals>.", "
 
 
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
-@pytest.mark.parametrize("method", ["auto", "rk4"])
+@pytest.mark.parametrize("method", ["auto", "RK4"])
 def test_no_room_of_a_run_calls_back_into_one_above_it(engine: str, method: str) -> None:
     """Except an engine, which is called by its protocol, and the monitor to which its functions report."""
-    options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "engine": engine, "integrator": method}
+    options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "engine": engine, "method": method}
     climbing = [each for each in entries(lambda: rd.simulate(plant(), Q, **options)) if each.climbs]
     assert [each for each in climbing if not each.function.startswith(PROTOCOL)] == []
     assert {each.room for each in climbing} <= {"compiled", "engine", "run"}
@@ -104,7 +104,7 @@ def test_only_the_error_estimate_enters_the_room_of_runs_again() -> None:
 
 
 def test_rollouts_in_lock_step_call_back_into_no_room_above() -> None:
-    options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "integrator": "rk4"}
+    options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "method": "RK4"}
     rd.rollouts(plant(), [Q, Q + 0.1], **options)
     seen = entries(lambda: rd.rollouts(plant(), [Q, Q + 0.1], **options))
     assert [each for each in seen if each.climbs] == []

@@ -33,7 +33,7 @@ def test_the_flyball_governor_moves_as_equations_by_hand() -> None:
 def test_the_governors_couplers_are_at_rest_length_and_its_ledger_closes() -> None:
     """By energy: what the dampers take is what is lost of K and of the potentials, 1e-12 of what is exchanged."""
     run = rd.simulate(replace(A05.setup(estimate_error=False), duration_s=0.4))
-    start = A05.setup().plant.torque(0.0, np.zeros(4), np.zeros(4))
+    start = A05.setup().plant.torque(np.zeros(4), np.zeros(4), t=0.0)
     np.testing.assert_allclose(start, 0.0, atol=1e-9)  # 8e5 N/m · 1e-16 m
     assert set(run.ledger.work) == {"control", "line_spring_damper", "line_spring_damper 2"}
     assert run.ledger.work["line_spring_damper"][-1] < -1e-3

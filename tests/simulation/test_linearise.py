@@ -38,7 +38,7 @@ def test_defaults_are_rest_and_the_actuation_without_acceleration() -> None:
     q, v = np.random.default_rng(8).normal(size=(2, 2))
     plant = rd.Plant(DOUBLE, [rd.effects.ViscousFriction(0.3), rd.effects.Spring(2.0)])
     for given, held in (((q,), (q, 0 * q)), ((q, v), (q, v))):
-        u = plant.inverse_dynamics(0.0, *held, np.zeros(2))
+        u = plant.inverse_dynamics(*held, np.zeros(2), t=0.0)
         for one, two in zip(rd.linearise(plant, *given), rd.linearise(plant, *held, u), strict=True):
             np.testing.assert_array_equal(one, two)
 
@@ -263,7 +263,7 @@ def test_a_small_deviation_with_states_moves_as_the_linearisation_says(effects) 
     start = np.concatenate([away, plant.equation_of_motion.start(q + away[:2], away[2:])])
     run = rd.simulate(
         plant, q + away[:2], v0=away[2:], duration_s=0.3, controller=rd.control.PD(rd.control.hold(q), 20.0, 3.0),
-        integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-13), estimate_error=False,
+        method=rd.integrate.Adaptive(rtol=1e-10, atol=1e-13), estimate_error=False,
     )  # fmt: skip
     moved = np.concatenate([run.q[-1] - q, run.v[-1], *(states[-1] for states in (run.effect_states or {}).values())])
     np.testing.assert_allclose(moved, expm(0.3 * (system.A - system.B @ K)) @ start, atol=1e-9)

@@ -41,7 +41,7 @@ def setup(x: float, kind: str = "computed torque") -> rd.Setup:
         "computed torque": rd.control.ComputedTorque(model, reference, 60.0 + x, [9.0, 8.0 + x]),
         "PID": rd.control.PID(reference, 60.0 + x, 20.0 + x, 9.0, effort_limit=25.0 + x, period_s=0.01),
     }
-    plant, steps = rd.Plant(arm, effects), ("rk4", 1e-3, 0.01, False)
+    plant, steps = rd.Plant(arm, effects), ("RK4", 1e-3, 0.01, False)
     return rd.Setup(plant, Q, V, 0.2, controllers[kind], *steps, engine="compiled")
 
 
@@ -72,7 +72,7 @@ def test_another_structure_is_compiled() -> None:
     ends = []
     for frame in ARM.frame_names[1:3]:
         setup = rd.Setup(rd.Plant(ARM, [rd.effects.ExternalWrench(frame, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2])]), Q)
-        options = {"duration_s": 0.1, "integrator": "rk4"}
+        options = {"duration_s": 0.1, "method": "RK4"}
         ours, theirs = (rd.simulate(setup, engine=x, **options).q[-1] for x in ("compiled", "interpreted"))
         assert np.abs(ours - theirs).max() < 1e-13
         ends.append(ours)
@@ -100,7 +100,7 @@ def test_another_structure_is_compiled() -> None:
 )
 def test_every_number_is_a_sweep_parameter(name: str, values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each run is that of the setup with this value; other values of what is swept compile nothing."""
-    base = replace(setup(0.0), record_period_s=0.02)
+    base = replace(setup(0.0), record_every_s=0.02)
     rd.rollouts(base, params={name: values[::-1] + 0.01})
     compiles_nothing(monkeypatch)
     runs = rd.rollouts(base, params={name: values})
@@ -179,8 +179,8 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
     by_name = rd.Plant(ARM, [Drag({ARM.joint_names[1]: 0.5})])
     np.testing.assert_array_equal(by_name.effects[0].strength, [0.0, 0.5])
     path = rd.control.quintic(Q, Q + 0.2, 0.1)
-    options = {"record_period_s": 0.01, "estimate_error": False}
-    base = rd.Setup(by_name, Q, V, 0.2, Follower(path, ARM, 50.0), "rk4", **options)
+    options = {"record_every_s": 0.01, "estimate_error": False}
+    base = rd.Setup(by_name, Q, V, 0.2, Follower(path, ARM, 50.0), "RK4", **options)
     theirs = rd.simulate(base, engine="interpreted")
     assert np.abs(rd.simulate(base, engine="compiled").q - theirs.q).max() < 1e-12
     assert theirs.desired is not None and np.abs(theirs.desired - path.at(theirs.t)[0]).max() == 0
@@ -200,7 +200,7 @@ def test_a_reference_of_a_users_own_is_not_taken_for_its_polynomial() -> None:
     """Its own `at` would be lost in machine code; "auto" runs it interpreted."""
     path = rd.control.quintic(Q, Q + 0.2, 0.1)
     shaken = Shaken(path.breaks, path.coefficients)
-    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.control.PD(path, 40.0, 4.0), "rk4", estimate_error=False)
+    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.control.PD(path, 40.0, 4.0), "RK4", estimate_error=False)
     rd.simulate(base, engine="compiled")
     own = replace(base, controller=rd.control.PD(shaken, 40.0, 4.0))
     assert rd.simulate(own).statistics.engine.startswith("interpreted (Shaken declares no knots")
@@ -223,7 +223,7 @@ def test_operational_space_is_compiled(turn: str) -> None:
     control = rd.control.OperationalSpace(
         UR5, "tool0", rd.control.line(p, p + np.array([0.1, 0.05, -0.1]), 0.2, **turns[turn]), 100.0, 20.0
     )
-    base = rd.Setup(rd.Plant(UR5), START, None, 0.2, control, "rk4", 2e-3, estimate_error=False)
+    base = rd.Setup(rd.Plant(UR5), START, None, 0.2, control, "RK4", 2e-3, estimate_error=False)
     ours, theirs = rd.simulate(base, engine="compiled"), rd.simulate(base, engine="interpreted")
     assert np.abs(ours.q - theirs.q).max() < 1e-10  # of 1 rad: κ(M) is 1e3, of the task 1e2
 

@@ -89,7 +89,7 @@ def test_each_drawing_is_of_a_result_with_a_table() -> None:
 
 
 def test_advice_has_the_keys_that_are_promised() -> None:
-    made = plain(rd.advise(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.1, integrator="rk4")))
+    made = plain(rd.advise(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.1, method="RK4")))
     keys = promised("advise")
     assert made.keys() == keys.keys()
     assert made["fastest"].keys() == names(keys["fastest"])

@@ -33,9 +33,9 @@ SETUP = rd.Setup(
     V,
     0.2,
     rd.control.PD(REFERENCE, 40.0, [4.0, 3.0]),
-    integrator="rk4",
+    method="RK4",
     step_s=2e-3,
-    record_period_s=0.01,
+    record_every_s=0.01,
 )
 
 PID = replace(SETUP, controller=rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
@@ -71,13 +71,13 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
     walls = {"joint_stops.upper": [[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]], "kp": [20.0, 30.0, 40.0]}
     hard = rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)])
-    chosen = {"integrator": rd.integrate.Adaptive(), "step_s": None, "record_period_s": 0.05, "engine": "compiled"}
+    chosen = {"method": rd.integrate.Adaptive(), "step_s": None, "record_every_s": 0.05, "engine": "compiled"}
     body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
     resting = rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)  # pushed away from v = 0: no reversal
     push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
     bristles = rd.effects.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
-    odd = {"duration_s": 0.123, "record_period_s": 0.0101}  # the run does not hold it a whole number of times
-    gauss = rd.integrate.method("gauss_4")
+    odd = {"duration_s": 0.123, "record_every_s": 0.0101}  # the run does not hold it a whole number of times
+    gauss = rd.integrate.method("GaussLegendre4")
     return {
         "one": (SETUP, {"q0": starts(1)}),
         "a tile and a bit more": (SETUP, {"q0": starts(70)}),
@@ -89,7 +89,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
             replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects), controller=known), {"params": masses},
         ),
         "levels": (
-            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1), {"params": levels},
+            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, method="RK4", record_every_s=0.1), {"params": levels},
         ),
         "chosen steps": (replace(SETUP, plant=hard, **chosen), {"q0": starts(3), "params": walls}),
         "payloads come and go": (
@@ -97,20 +97,20 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
             {"params": {"gravity": [[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]]}},
         ),
         "bristles": (
-            rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, integrator="rk4"), {"q0": starts(3, 0.01)},
+            rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, method="RK4"), {"q0": starts(3, 0.01)},
         ),
-        "tons": (rd.Setup(rd.Plant(ARM.with_(mass_scale=2000.0)), [1.5, 0.2], duration_s=0.2, integrator="rk4"), {}),
-        **{f"every {x} s": (replace(SETUP, record_period_s=x), {"q0": starts(2)}) for x in (0.0, 0.005, 0.03, 0.5)},
+        "tons": (rd.Setup(rd.Plant(ARM.with_(mass_scale=2000.0)), [1.5, 0.2], duration_s=0.2, method="RK4"), {}),
+        **{f"every {x} s": (replace(SETUP, record_every_s=x), {"q0": starts(2)}) for x in (0.0, 0.005, 0.03, 0.5)},
         "between cut steps": (replace(SETUP, **odd), {"q0": starts(2)}),
         "between steps": (replace(SETUP, plant=rd.Plant(ARM, PLANT.effects[:2]), **odd), {"q0": starts(2)}),
         "between steps in (q, p)": (
-            replace(SETUP, plant=rd.Plant(ARM, [bristles]), integrator=gauss, **odd), {"q0": starts(2)},
+            replace(SETUP, plant=rd.Plant(ARM, [bristles]), method=gauss, **odd), {"q0": starts(2)},
         ),
-        "Gauss": (replace(SETUP, integrator=rd.integrate.method("gauss_2")), {"q0": starts(70)}),
+        "GaussLegendre": (replace(SETUP, method=rd.integrate.method("GaussLegendre2")), {"q0": starts(70)}),
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", [*(name for name in batches() if name != "Gauss"), *long(["Gauss"])])
+@pytest.mark.parametrize("name", [*(name for name in batches() if name != "GaussLegendre"), *long(["GaussLegendre"])])
 def test_each_run_is_that_of_simulate(name: str) -> None:
     """To rounding: samples, energies, works and outcome; run i of the batch is that of `setup_of(i)`."""
     setup, given = batches()[name]
@@ -168,14 +168,14 @@ def test_threads_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("effects", [PLANT.effects, PLANT.effects[:2]])
-@pytest.mark.parametrize("method", ["rk4", *long(["gauss_2"])])
+@pytest.mark.parametrize("method", ["RK4", *long(["GaussLegendre2"])])
 def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects: list[Any]) -> None:
     """Bit for bit; its own samples are those of simulate up to its end, then nan.
 
     It names its time and reason as simulate does; before its step is judged, the joint that moved fastest.
     """
     plant = rd.Plant(ARM, effects)
-    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_period_s=0.0)
+    setup = replace(SETUP, plant=plant, method=rd.integrate.method(method), record_every_s=0.0)
     q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
     wild = [3, 17]
     quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
@@ -206,7 +206,7 @@ def test_a_run_that_overflows_ends_at_the_step_at_which_simulate_ends_it(engine:
     """Velocities square from step to step: from 1e100 to 1e308 it is one or two of them. Rounding moves no end."""
     rng, h = np.random.default_rng(2), 0.02
     q0, v0 = rng.normal(size=(12, 2)), 30.0 * rng.normal(size=(12, 2))
-    setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, integrator="explicit_euler", step_s=h, engine=engine)
+    setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, method="Euler", step_s=h, engine=engine)
     runs = rd.rollouts(replace(setup, engine="auto"), q0, v0)
     wild = np.flatnonzero(runs.diverged)
     assert len(set(np.rint(runs.ended[wild] / h))) > 2
@@ -227,7 +227,7 @@ def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * (1 + np.abs(theirs).max()))
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, integrator=rd.integrate.method("gauss_2"))])])
+@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, method=rd.integrate.method("GaussLegendre2"))])])
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
 def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
     """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
@@ -236,7 +236,7 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
     effects = [rd.effects.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
     alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
     run = runs[-1]
-    for name in ("t", "q", "v", "desired", "deviation"):
+    for name in ("t", "q", "v", "desired", "tracking_error"):
         assert_alike(getattr(run, name), getattr(alone, name))
     everything, follows = record == EVERYTHING, not setup.controller.state_size
     for ours, theirs, known in (
@@ -383,7 +383,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "params must give values by name, .*3": {"params": {3: ones}},
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
-        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_period_s": {
+        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
             "q0": starts(4), "most_bytes": 100,
         },
     }.items():  # fmt: skip
@@ -410,7 +410,7 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     The runs that stay between the stops are those of lock step, bit for bit.
     """
     plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.effects.joint_stops(-0.1, 0.5, 1e5, 0.0))
-    setup = rd.Setup(plant, Q, duration_s=1.0, integrator="rk4", step_s=2e-3, estimate_error=False)
+    setup = rd.Setup(plant, Q, duration_s=1.0, method="RK4", step_s=2e-3, estimate_error=False)
     q0, v0 = np.tile([0.2, 0.15], (70, 1)), np.full((70, 2), [0.05, -0.1])
     strikes = [2, 65]
     v0[strikes] = [[2.0, -1.4], [-0.8, 2.4]]
@@ -434,8 +434,8 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
     down = rd.Event(lambda t, q, v: q[0] - 0.35, name="down", terminal=True)
     setup = replace(SETUP, controller=None, events=[down], estimate_error=False, duration_s=0.3)
     q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
-    for method in ("rk4", "DOP853"):
-        runs = rd.rollouts(setup, q0, 0 * q0, integrator=rd.integrate.method(method) if method == "rk4" else method)
+    for method in ("RK4", "DOP853"):
+        runs = rd.rollouts(setup, q0, 0 * q0, method=rd.integrate.method(method) if method == "RK4" else method)
         back = rd.read(runs.save(tmp_path / method))
         for i in range(3):
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
@@ -463,7 +463,7 @@ def interrupt_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatch) -> None:
     """Also of runs that were to be made again: theirs are kept up to the step in which they may pass a threshold."""
     short = replace(SETUP, plant=rd.Plant(ARM, effects))
-    setup = replace(short, duration_s=100.0, record_period_s=10.0)
+    setup = replace(short, duration_s=100.0, record_every_s=10.0)
     rd.rollouts(short, starts(1))  # compiled before
     interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), threads=2)
@@ -477,7 +477,7 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
 
 def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
     """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
-    setup = replace(SETUP, integrator=rd.integrate.method("DOP853"), step_s=None)
+    setup = replace(SETUP, method=rd.integrate.method("DOP853"), step_s=None)
     rd.rollouts(setup, starts(1))  # compiled before
     interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)

@@ -36,9 +36,9 @@ LATE = rd.control.Loop(rd.control.PD(GOAL, 500.0, [60.0, 0.1], period_s=0.02), a
 SWEEP = np.linspace(0.2, 1.6, B)
 
 
-def setup(plant: rd.Plant, controller: object, method: str = "rk4", **options) -> rd.Setup:
+def setup(plant: rd.Plant, controller: object, method: str = "RK4", **options) -> rd.Setup:
     own = {} if method == "DOP853" else {"step_s": 4e-3 if getattr(controller, "period_s", 0.0) else 5e-4}
-    return rd.Setup(plant, Q, V, 0.8, controller, integrator=method, record_period_s=0.1, **own | options)
+    return rd.Setup(plant, Q, V, 0.8, controller, method=method, record_every_s=0.1, **own | options)
 
 
 SCENES = {
@@ -48,12 +48,12 @@ SCENES = {
         setup(LIMITED, rd.control.PD(GOAL, 10.0, 150.0, period_s=0.02)),
         {"effort_limit.limit": 100.0 * SWEEP},
     ),
-    "canonical": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0), "gauss_2"), {"kp": 500 * SWEEP}),
+    "canonical": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0), "GaussLegendre2"), {"kp": 500 * SWEEP}),
     "cut at stops": (
         setup(STOPPED, rd.control.PD(GOAL, 300.0, 20.0)),
         {"kp": 300 * SWEEP, "joint_stops.upper": 0.8 + SWEEP},
     ),
-    "time stepping": (setup(HELD, rd.control.PD(GOAL, 400.0, 20.0), "time_stepping"), {"kp": 400 * SWEEP}),
+    "time stepping": (setup(HELD, rd.control.PD(GOAL, 400.0, 20.0), "MoreauJean"), {"kp": 400 * SWEEP}),
     "one by one": (
         setup(STOPPED, rd.control.PID(GOAL, 300.0, 30.0, 20.0, effort_limit=80.0), "DOP853"),
         {"effort_limit": 60 * SWEEP},
@@ -108,7 +108,7 @@ def test_each_run_has_the_remarks_of_simulate(batch) -> None:
         size = np.abs(alone[i].extremes).max()
         rows = 2 if runs.observed.instants.any() else 3
         np.testing.assert_allclose(runs[i].extremes[:rows], alone[i].extremes[:rows], rtol=0, atol=1e-7 * size)
-        allowed = 2500.0 * SPACING if runs.setup.integrator.nonsmooth else 5e-3 * size
+        allowed = 2500.0 * SPACING if runs.setup.method.nonsmooth else 5e-3 * size
         np.testing.assert_allclose(runs[i].extremes, alone[i].extremes, rtol=0, atol=allowed)
 
 
@@ -136,10 +136,10 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
 def test_actuation_that_changes_between_ticks_is_seen_at_instants(sampled: bool) -> None:
     """Its extremes are those of a record of all steps, at each eighth and at samples; behind a lag at all of them."""
     of = setup(LAGGING, rd.control.PD(GOAL, 300.0, 20.0, period_s=0.02 if sampled else 0.0))
-    of = replace(of, step_s=5e-4, record_period_s=0.0145)
+    of = replace(of, step_s=5e-4, record_every_s=0.0145)
     starts, record = Q + 0.3 * np.random.default_rng(5).normal(size=(B, 2)), ("u",)
     runs = rd.rollouts(of, starts, record=record)
-    u = rd.rollouts(replace(of, record_period_s=0.0), starts, record=record).u
+    u = rd.rollouts(replace(of, record_every_s=0.0), starts, record=record).u
     every = np.arange(u.shape[1]) % (1 if sampled else 8) == 0
     every[np.rint(runs.t / 5e-4).astype(int)] = True
     expected = np.stack([u[:, every].min(axis=1), u[:, every].max(axis=1)], axis=1)
@@ -150,7 +150,7 @@ def test_actuation_that_changes_between_ticks_is_seen_at_instants(sampled: bool)
 
 def test_tracking_errors_are_those_of_simulate(batch) -> None:
     runs, alone = batch
-    np.testing.assert_allclose(runs.tracking_error, [each.tracking_error for each in alone], rtol=1e-6)
+    np.testing.assert_allclose(runs.rms_tracking_error, [each.rms_tracking_error for each in alone], rtol=1e-6)
 
 
 def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
@@ -158,12 +158,12 @@ def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
     runs, _ = batch
     back = rd.read(runs.save(tmp_path / "runs"))
     assert back.remarks == runs.remarks and back.worst == runs.worst
-    np.testing.assert_array_equal(back.tracking_error, runs.tracking_error)
+    np.testing.assert_array_equal(back.rms_tracking_error, runs.rms_tracking_error)
     for some in (runs[1:4], back[1:4]):
         for i in range(3):
             about = {key for key, remark in told(runs).items() if i + 1 in remark.runs}
             assert {key for key, remark in told(some).items() if i in remark.runs} == about == told(some[i]).keys()
-        np.testing.assert_array_equal(some.tracking_error, runs.tracking_error[1:4])
+        np.testing.assert_array_equal(some.rms_tracking_error, runs.rms_tracking_error[1:4])
         assert all(each.looked in (1, 3) for each in some.remarks)
     for x, y in zip(told(back[1:4]).values(), told(runs[1:4]).values(), strict=True):
         assert x.text == y.text or x.text.endswith(", in another run")  # the reference is not in the file
@@ -179,7 +179,9 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     assert [row["run"] for row in rows] == [str(i) for i in range(B)]
     of_slide = [float(row["largest u slide [N]"]) for row in rows]
     np.testing.assert_array_equal(of_slide, runs.observed.extremes[:, 2, 1, 0])
-    np.testing.assert_array_equal([float(row["tracking error [m or rad]"]) for row in rows], runs.tracking_error)
+    np.testing.assert_array_equal(
+        [float(row["rms tracking error [m or rad]"]) for row in rows], runs.rms_tracking_error
+    )
     for i, row in enumerate(rows):
         assert float(row["start q slide [m]"]) == runs.q0[i, 0]
         assert float(row["start v hinge [rad/s]"]) == runs.v0[i, 1]
@@ -200,7 +202,7 @@ def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
     )
     assert remark.runs == (runs.worst,) and remark.joint == theirs.joint
     assert remark.value == pytest.approx(theirs.value, rel=1e-6) and remark.remedy == theirs.remedy
-    assert f"{remark.text} (run {runs.worst}; the only run looked at)" in runs.summary
+    assert f"{remark.text} (run {runs.worst}; the only run examined)" in runs.summary
 
 
 def test_tracking_errors_of_a_frame() -> None:
@@ -211,12 +213,12 @@ def test_tracking_errors_of_a_frame() -> None:
     law = rd.control.OperationalSpace(
         arm, "tip", rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), 50.0, 10.0, rows=(0, 2)
     )
-    given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, integrator="rk4", step_s=4e-3)
+    given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, method="RK4", step_s=4e-3)
     runs = rd.rollouts(given, np.add(q, [[0.0, 0.1], [0.2, -0.1], [0.1, 0.3]]), [[0.1, 0.2], [0.3, 0.1], [1e5, 3e7]])
     assert list(runs.diverged) == [False, False, True]
     assert runs.worst == 2
-    alone = [rd.simulate(runs.setup_of(i), estimate_error=False).tracking_error for i in range(3)]
-    np.testing.assert_allclose(runs.tracking_error[:2], alone[:2], rtol=1e-9)
+    alone = [rd.simulate(runs.setup_of(i), estimate_error=False).rms_tracking_error for i in range(3)]
+    np.testing.assert_allclose(runs.rms_tracking_error[:2], alone[:2], rtol=1e-9)
     assert {run.about["frame"] for run in runs} == {"tip"} and "tracking error of the frame [m]: " in runs.summary
 
 
@@ -236,7 +238,7 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     given = rd.Setup(
         rd.Plant(CART, [rd.effects.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.control.PD(GOAL, 40.0, 4.0, period_s=0.02)
     )
-    runs = rd.rollouts(replace(given, integrator=rd.integrate.method("rk4")))
+    runs = rd.rollouts(replace(given, method=rd.integrate.method("RK4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
         (at,) = (each for each in remarks if each.kind is RemarkKind.EFFORT_REACHED and each.joint == "slide")
         assert at.duration == pytest.approx(0.2, rel=1e-9)

@@ -129,7 +129,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "no text 'about'"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not JSON"),
         ("about", lambda text: np.array([str(text)]), "no text 'about'"),
-        ("about", lambda text: said(text, format=3), "it has format 3, but this version reads 8; .*robot-dyn"),
+        ("about", lambda text: said(text, format=3), "it has format 3, but this version reads 9; .*robot-dyn"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("about", lambda text: said(text, novelty=3), "'novelty': .*3"),
@@ -139,7 +139,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda text: said(text, joint_names=[1, 2]), "'joint_names/0': .*1"),
         ("about", lambda text: said(text, joint_names=["a"]), "'q' is of 2 joints, 'joint_names' of 1"),
         ("about", lambda text: said(text, v="q"), "'v': its array is missing"),
-        ("about", lambda text: said(text, deviation="u", u=None), "'u': its array is missing"),
+        ("about", lambda text: said(text, tracking_error="u", u=None), "'u': its array is missing"),
         ("about", lambda text: said(text, power={}), "member 'power/.*' is unknown to this version"),
         ("about", lambda text: said(text, outcome__reason="done"), "'outcome/reason': .*interrupted.*'done'"),
         ("about", lambda text: said(text, outcome__t=float("nan")), "'outcome/t' holds nan, not a time"),
@@ -207,7 +207,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(run, tmp_path, size, shape, mes
 def test_runs_of_zeros_are_saved_and_loaded(tmp_path) -> None:
     """The reader's bound for bombs refuses no file of the writer, however well its arrays compress."""
     plant = rd.Plant(rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)), [])
-    runs = rd.rollouts(plant, np.zeros((100, 2)), duration_s=1.0, integrator="rk4", step_s=1e-3)
+    runs = rd.rollouts(plant, np.zeros((100, 2)), duration_s=1.0, method="RK4", step_s=1e-3)
     back = rd.read(runs.save(tmp_path / "runs"))
     assert runs.q is not None and back.q is not None
     assert not runs.q.any() and np.array_equal(back.q, runs.q)

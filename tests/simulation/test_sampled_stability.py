@@ -103,12 +103,12 @@ def test_a_step_has_its_limit_however_short_the_run() -> None:
     """1 kg with a damper of 100 N s/m: RK4 is stable up to 2.785/100 s, also where a run is two steps long."""
     plant = rd.Plant(BLOCK, [rd.effects.ViscousFriction(100.0)])
     for duration in (0.1, 10.0):
-        advice = rd.advise(plant, [0.0], [1.0], duration_s=duration, integrator="rk4", step_s=0.05)
-        assert advice.limits["rk4"] == pytest.approx(0.02785293563405282, rel=1e-3)
+        advice = rd.advise(plant, [0.0], [1.0], duration_s=duration, method="RK4", step_s=0.05)
+        assert advice.limits["RK4"] == pytest.approx(0.02785293563405282, rel=1e-3)
         assert not advice.stable
 
 
-@pytest.mark.parametrize("options", [{"integrator": "rk4", "step_s": 1e-3}, {"integrator": "DOP853"}])
+@pytest.mark.parametrize("options", [{"method": "RK4", "step_s": 1e-3}, {"method": "DOP853"}])
 def test_a_run_that_its_loop_ends_says_so_and_not_to_take_a_smaller_step(options) -> None:
     """A pendulum with a spring of 1e8 N m/rad on ticks of 10 ms, whatever the step."""
     joint, law = rd.load("pendulum"), rd.control.PD(rd.control.hold([0.0]), 1e8, 0.0, 0.01)
@@ -128,7 +128,7 @@ def test_a_run_that_its_step_ends_under_a_stable_loop_says_so() -> None:
         rd.control.PD(rd.control.hold([0.0]), 100.0, 0.0, 0.01),
     )
     run = rd.simulate(
-        plant, [0.1], [1.0], duration_s=0.5, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
+        plant, [0.1], [1.0], duration_s=0.5, controller=law, method="RK4", step_s=1e-3, estimate_error=False
     )
     assert run.outcome.ending == "diverged"
     (remark,) = (each for each in run.remarks if each.kind is RemarkKind.TOO_LONG)
@@ -149,7 +149,7 @@ def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
     def remarks(period: float) -> list:
         law = rd.control.PD(upright, 0.0, kd, period_s=period)
         run = rd.simulate(
-            plant, [np.pi - 0.01], duration_s=0.3, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
+            plant, [np.pi - 0.01], duration_s=0.3, controller=law, method="RK4", step_s=1e-3, estimate_error=False
         )
         return [each.remedy for each in run.remarks if each.kind is RemarkKind.UNSTABLE]
 

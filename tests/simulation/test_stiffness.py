@@ -59,16 +59,14 @@ def test_without_effects_it_is_the_bodies() -> None:
 def test_a_run_says_that_stability_bounds_its_steps() -> None:
     """With the joint and the effect, where a damper is stiff and motion has decayed; not where the tolerance does."""
     options: dict[str, Any] = {"q0": STATE[:2], "duration_s": 0.1, "engine": "compiled", "estimate_error": False}
-    options |= {"integrator": "DOP853"}
+    options |= {"method": "DOP853"}
     stiff = rd.simulate(rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e4])]), **options)
     (remark,) = (each for each in stiff.remarks if each.kind is RemarkKind.STIFF)
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
     assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
-    assert "by 'viscous_friction'; use integrator='Rosenbrock'" in stiff.summary
-    short = rd.simulate(
-        ARM, **options | {"duration_s": 20.0, "integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)}
-    )
+    assert "by 'viscous_friction'; use method='Rodas5P'" in stiff.summary
+    short = rd.simulate(ARM, **options | {"duration_s": 20.0, "method": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     assert short.statistics.steps > 1000
     assert not [each for each in short.remarks if each.kind is RemarkKind.STIFF]
 
@@ -76,24 +74,24 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
 @pytest.mark.parametrize("engine", ["compiled", *long(["interpreted"])])
 def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: str) -> None:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e6])])
-    run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False, integrator="DOP853")
+    run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False, method="DOP853")
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 1.0
-    assert re.search("of joint 'joint_2', by 'viscous_friction': take Rosenbrock, softer", run.outcome.text)
+    assert re.search("of joint 'joint_2', by 'viscous_friction': take Rodas5P, softer", run.outcome.text)
 
 
 def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> None:
     """Both are right to their estimates; the first takes a few of the steps, and says why."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e4])])
-    chosen, named = (rd.simulate(plant, STATE[:2], duration_s=0.5, integrator=name) for name in ("auto", "DOP853"))
-    assert chosen.statistics.method == "Rosenbrock"
+    chosen, named = (rd.simulate(plant, STATE[:2], duration_s=0.5, method=name) for name in ("auto", "DOP853"))
+    assert chosen.statistics.method == "Rodas5P"
     assert 20 * chosen.statistics.steps < named.statistics.steps
     assert np.abs(chosen.q - named.q).max() < 3 * (
         chosen.error.largest + named.error.largest
     )  # estimates may be 0.3 of it
     (remark,) = (each for each in chosen.remarks if each.kind is RemarkKind.STIFF)
     assert remark.joint == "joint_2"
-    assert "by 'viscous_friction'; made by Rosenbrock instead of DOP853" in chosen.summary
+    assert "by 'viscous_friction'; made by Rodas5P instead of DOP853" in chosen.summary
 
 
 @pytest.mark.parametrize(
@@ -105,7 +103,7 @@ def test_other_runs_are_those_of_the_explicit_method(effects: list[rd.Effect], t
     """To the last bit, looks included: both take more steps than the first look waits for."""
     options: dict[str, Any] = {"q0": STATE[:2], "duration_s": 5.0 if effects else 20.0, "estimate_error": False}
     chosen, named = (
-        rd.simulate(rd.Plant(ARM, effects), **options, integrator=rd.integrate.Adaptive(name, tolerance, tolerance))
+        rd.simulate(rd.Plant(ARM, effects), **options, method=rd.integrate.Adaptive(name, tolerance, tolerance))
         for name in ("auto", "DOP853")
     )
     assert chosen.statistics.steps > 600
@@ -115,7 +113,7 @@ def test_other_runs_are_those_of_the_explicit_method(effects: list[rd.Effect], t
 
 def test_rollouts_are_made_by_the_explicit_method_and_equations_name_one() -> None:
     """Where a method is to be chosen: no run of many is another's, and a plain equation has nothing to look at."""
-    chosen, named = (rd.rollouts(ARM, [STATE[:2]], duration_s=0.2, integrator=name) for name in ("auto", "DOP853"))
+    chosen, named = (rd.rollouts(ARM, [STATE[:2]], duration_s=0.2, method=name) for name in ("auto", "DOP853"))
     np.testing.assert_array_equal(chosen.q, named.q)
-    with pytest.raises(QueryError, match="name 'DOP853' or 'Rosenbrock' here"):
+    with pytest.raises(QueryError, match="name 'DOP853' or 'Rodas5P' here"):
         rd.integrate.Adaptive("auto").solve(System(lambda t, y: -y, 1), 0.0, np.ones(2), 1.0)

@@ -30,28 +30,28 @@ LIMITED = {"limits reached and left": 7, "limits, with back-calculation": 3}  # 
 
 def run(scene: str, **options) -> rd.Trajectory:
     effects, controller = SCENES[scene]
-    options = {"estimate_error": False, "record_period_s": 0.9, "engine": "compiled"} | options
+    options = {"estimate_error": False, "record_every_s": 0.9, "engine": "compiled"} | options
     return rd.simulate(rd.Plant(ARM, effects), START, duration_s=0.9, controller=controller, **options)
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_halved_steps_keep_the_order(scene: str) -> None:
     """The same events, and in the mean of five halvings order 4 ± 0.15; order 8 down to 7.5, or to rounding."""
-    exact = run(scene, integrator=rd.integrate.Adaptive("DOP853", 1e-13, 1e-13))
+    exact = run(scene, method=rd.integrate.Adaptive("DOP853", 1e-13, 1e-13))
     names = [each.name for each in exact.events]
     assert (len(names) > 1) is (scene in ("stops struck", "bristles that reverse", *LIMITED))
     assert len(names) == LIMITED.get(scene, len(names))
     errors = []
     for h in 5e-3 / 2 ** np.arange(6):
-        made = run(scene, integrator="rk4", step_s=h)
+        made = run(scene, method="RK4", step_s=h)
         assert [each.name for each in made.events] == names
         errors.append(np.abs(made.q[-1] - exact.q[-1]).max())
     assert -np.polyfit(np.arange(6), np.log2(errors), 1)[0] == pytest.approx(4, abs=0.15)
     steps, floor = ((0.02, 0.01), 0.0) if scene in LIMITED else ((0.005, 0.0025), 1e-13)
-    coarse, fine = (np.abs(run(scene, integrator="order_8", step_s=h).q - exact.q).max() for h in steps)
+    coarse, fine = (np.abs(run(scene, method="DP8", step_s=h).q - exact.q).max() for h in steps)
     assert fine < max(coarse / 2**7.5, floor)
     for tolerance in (1e-6, 1e-9) if scene in LIMITED else ():
-        loose = run(scene, integrator=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance))
+        loose = run(scene, method=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance))
         assert np.abs(loose.q[-1] - exact.q[-1]).max() < tolerance
 
 
@@ -59,8 +59,8 @@ def test_bristles_at_rest_reverse_no_more() -> None:
     """Where a joint comes to rest its velocity is rounding, to and fro: below a millionth of v_s nothing is cut."""
     effects, controller = SCENES["bristles that reverse"]
     still = rd.simulate(
-        rd.Plant(ARM, effects), START, duration_s=20.0, controller=controller, engine="compiled", record_period_s=20.0,
-        integrator=rd.integrate.Adaptive("DOP853", 1e-10, 1e-10), estimate_error=False,
+        rd.Plant(ARM, effects), START, duration_s=20.0, controller=controller, engine="compiled", record_every_s=20.0,
+        method=rd.integrate.Adaptive("DOP853", 1e-10, 1e-10), estimate_error=False,
     )  # fmt: skip
     assert 2 < len(still.events) < 100
     assert still.events[-1].t < 10.0
@@ -69,7 +69,7 @@ def test_bristles_at_rest_reverse_no_more() -> None:
 
 def test_companions_of_a_run_that_an_event_ends_go_on_past_it() -> None:
     """The event falls on times at which runs are compared, ± 3e-8 s: a companion may meet it before, the run behind."""
-    options = {"duration_s": 2.0, "integrator": rd.integrate.Adaptive("DOP853", 1e-6, 1e-6), "record_period_s": 0.1}
+    options = {"duration_s": 2.0, "method": rd.integrate.Adaptive("DOP853", 1e-6, 1e-6), "record_every_s": 0.1}
     free = rd.simulate(ARM, START, estimate_error=False, **options)
     for k in range(2, 10):
         way = np.sign(free.v[k, 0])

@@ -24,7 +24,7 @@ def run() -> rd.Trajectory:
 @pytest.fixture(scope="module")
 def batch() -> rd.Rollouts:
     """Three runs, one of which diverges."""
-    setup = replace(SETUP, integrator="rk4", step_s=5e-3, record_period_s=5e-3)
+    setup = replace(SETUP, method="RK4", step_s=5e-3, record_every_s=5e-3)
     runs = rd.rollouts(setup, params={"kp": [90.0, 45.0, 1e8]}, record=("q", "v", "u", "energy", "work"))
     assert runs.diverged.tolist() == [False, False, True]
     return runs
@@ -49,7 +49,7 @@ def test_a_table_holds_the_samples_by_quantity_joint_and_unit(run) -> None:
         np.testing.assert_array_equal(table[heading], values)
 
 
-def test_a_frame_has_its_deviation_by_axis() -> None:
+def test_a_frame_has_its_tracking_error_by_axis() -> None:
     arm = rd.load("planar_2r")
     q = np.array([0.4, 0.9])
     at = arm.placement(q, "tip")[:3, 3]
@@ -57,8 +57,8 @@ def test_a_frame_has_its_deviation_by_axis() -> None:
     controller = rd.control.OperationalSpace(arm, "tip", line, 50.0, 10.0, rows=(0, 2))
     run = rd.simulate(rd.Plant(arm), q, controller=controller, duration_s=0.02, estimate_error=False)
     assert run.desired is None
-    np.testing.assert_array_equal(run.table()["deviation y [m]"], run.deviation[:, 1])
-    assert np.abs(run.deviation).max() > 0
+    np.testing.assert_array_equal(run.table()["tracking error y [m]"], run.tracking_error[:, 1])
+    assert np.abs(run.tracking_error).max() > 0
     assert "desired" not in " ".join(run.table())
 
 
@@ -99,8 +99,8 @@ def test_what_was_swept_has_its_unit() -> None:
 
 
 def test_a_run_that_recorded_nothing_has_no_rms() -> None:
-    runs = rd.rollouts(replace(SETUP, integrator="rk4"), record=("q",), params={"kp": [90.0, 45.0]})
-    assert not [heading for heading in runs.table() if heading.startswith("rms")]
+    runs = rd.rollouts(replace(SETUP, method="RK4"), record=("q",), params={"kp": [90.0, 45.0]})
+    assert not [heading for heading in runs.table() if heading.startswith(("rms v", "rms u"))]
 
 
 @pytest.mark.parametrize("of", ["run", "batch"])

@@ -78,8 +78,8 @@ def both(setup: Setup) -> tuple[Any, Any]:
 
 def setup(what: list[Any], name: Any, **options: Any) -> Setup:
     """A run that keeps no estimate."""
-    options = {"duration_s": 0.6, "record_period_s": 0.02, **options}
-    return Setup(rd.Plant(ARM, what), Q0, V0, integrator=name, engine="compiled", estimate_error=False, **options)
+    options = {"duration_s": 0.6, "record_every_s": 0.02, **options}
+    return Setup(rd.Plant(ARM, what), Q0, V0, method=name, engine="compiled", estimate_error=False, **options)
 
 
 @pytest.mark.parametrize("sampled", [*long([False]), True], ids=["continuous", "sampled"])
@@ -105,15 +105,19 @@ def test_a_fixed_step_gives_the_same_bits(name: str, sampled: bool) -> None:
 HELD = [rd.effects.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.effects.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
 GEAR = [rd.effects.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
 SOFT = [*HELD, *rd.effects.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
-REST = [*product([ADAPTIVE[1], "gauss_4", "rosenbrock_5"], [None, SAMPLED]), (ADAPTIVE[0], None), ("rk4", SAMPLED)]
+REST = [
+    *product([ADAPTIVE[1], "GaussLegendre4", "Rodas5PFixed"], [None, SAMPLED]),
+    (ADAPTIVE[0], None),
+    ("RK4", SAMPLED),
+]
 
 
 @pytest.mark.parametrize(
     ("name", "what", "controller"),
     [
-        *((ADAPTIVE[0], BOUNDED, SAMPLED), ("rk4", BOUNDED, None)),
+        *((ADAPTIVE[0], BOUNDED, SAMPLED), ("RK4", BOUNDED, None)),
         *(("DOP853", GEAR, CONTINUOUS), ("DOP853", SOFT, SAMPLED)),
-        *long([("rk4", GEAR, SAMPLED), ("rosenbrock_5", HELD, CONTINUOUS)]),
+        *long([("RK4", GEAR, SAMPLED), ("Rodas5PFixed", HELD, CONTINUOUS)]),
         *long((name, BOUNDED, controller) for name, controller in REST),
     ],
 )
@@ -140,7 +144,7 @@ def test_a_run_with_events_gives_the_same_bits(name: str, what: list[Any], contr
 
 def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
     """One joint or two, one threshold or four: no array has a type of its own."""
-    made = [setup([*HELD, *rd.effects.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "rk4", step_s=0.01)]
+    made = [setup([*HELD, *rd.effects.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "RK4", step_s=0.01)]
     rail = rd.Plant(arms()["rail"], [rd.effects.RigidStops(0.0, 5.0), *rd.effects.joint_stops([0.1], [9.0], 900.0)])
     made.append(replace(made[0], plant=rail, q0=[0.3], v0=[0.0]))
     loops = []
@@ -167,7 +171,11 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
 
 @pytest.mark.parametrize(
     ("name", "controller"),
-    [("rk4", CONTINUOUS), ("gauss_4", SAMPLED), *long((name, SAMPLED) for name in PLAIN if name != "gauss_4")],
+    [
+        ("RK4", CONTINUOUS),
+        ("GaussLegendre4", SAMPLED),
+        *long((name, SAMPLED) for name in PLAIN if name != "GaussLegendre4"),
+    ],
 )
 def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control.Controller) -> None:
     """64 runs, of which some diverge, with ticks or with instants at every third step, and samples; 100 steps."""
@@ -212,7 +220,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
 
 def test_the_loops_are_translated_as_they_stand() -> None:
     """No loop has a text of its own for machine code."""
-    of = method("rk4").stepper(FLOAT64, 2, 1, 2)
+    of = method("RK4").stepper(FLOAT64, 2, 1, 2)
     assert MachineFunction(time_loop(of.step), INSTEAD, lambda: None, "").function.__name__ == "advance"
 
 
@@ -269,7 +277,7 @@ class Heun(PlainMethod):
 def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -> None:
     """Both take the compiled equation; a step in arrays runs in Python, and says the line and what to write."""
     options: dict[str, Any] = {"engine": "compiled", "step_s": 2e-3, "duration_s": 0.4, "estimate_error": False}
-    made = [rd.simulate(rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(of), **options) for of in (heun, heun_by_arrays)]
+    made = [rd.simulate(rd.Plant(ARM, SMOOTH), Q0, V0, method=Heun(of), **options) for of in (heun, heun_by_arrays)]
     np.testing.assert_allclose(made[0].q, made[1].q, rtol=0, atol=1e-13)  # rounding of another order
     assert made[0].statistics.engine == "compiled"
     said = made[1].statistics.engine
@@ -281,15 +289,13 @@ def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -
     )
     assert said in made[1].summary
     with pytest.raises(SubsetError, match=f"line {line}, in heun_by_arrays"):
-        rd.rollouts(
-            rd.Plant(ARM, SMOOTH), [Q0] * 3, [V0] * 3, integrator=Heun(heun_by_arrays), step_s=2e-3, duration_s=0.1
-        )
+        rd.rollouts(rd.Plant(ARM, SMOOTH), [Q0] * 3, [V0] * 3, method=Heun(heun_by_arrays), step_s=2e-3, duration_s=0.1)
 
 
 def test_a_step_that_errs_ends_the_run_with_its_line() -> None:
     """Not as a run that diverged."""
     with pytest.raises(MachineCodeError, match=r"heun_that_errs, line \d+: an index is out of range"):
         rd.simulate(
-            rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(heun_that_errs), engine="compiled", step_s=2e-3,
+            rd.Plant(ARM, SMOOTH), Q0, V0, method=Heun(heun_that_errs), engine="compiled", step_s=2e-3,
             duration_s=0.4, estimate_error=False,
         )  # fmt: skip

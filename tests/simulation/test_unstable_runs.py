@@ -88,7 +88,7 @@ def test_a_step_just_above_the_longest_stable_one_is_reported_with_that_one(join
     limit = STABLE * INERTIA / kd
     law = rd.control.PD(rd.control.hold([0.0]), 0.0, kd)
     run = rd.simulate(
-        rd.Plant(joint), [0.1], [1.0], duration_s=5000 * limit * part, controller=law, integrator="rk4",
+        rd.Plant(joint), [0.1], [1.0], duration_s=5000 * limit * part, controller=law, method="RK4",
         step_s=limit * part,
     )  # fmt: skip
     if part < 1:
@@ -125,7 +125,7 @@ def test_a_run_that_a_stop_throws_out_of_its_steps_has_not_finished() -> None:
     law = rd.control.PD(rd.control.hold([0.0, 0.0]), 40.0, 4.0)
     run = rd.simulate(
         rd.Plant(arm, [rd.effects.EffortLimit(30.0), *stops]), [0.4, -0.7], [3.0, 5.0], duration_s=0.2, controller=law,
-        integrator="rk4", step_s=2e-3,
+        method="RK4", step_s=2e-3,
     )  # fmt: skip
     assert run.outcome.ending == "diverged" and run.outcome.joint == "joint_2"
     assert max(event.t for event in run.events) <= run.outcome.t < 0.2, "an event was located after the end"
@@ -138,8 +138,6 @@ def test_no_event_of_states_that_overflow_is_after_the_end_of_the_run(kp: float,
     arm = rd.load("pendulum")
     law = rd.control.PD(rd.control.hold([0.2]), kp, 0.0)
     plant = rd.Plant(arm, [rd.effects.EffortLimit(1e300), *rd.effects.joint_stops([-1.0], [1.0], 1e4)])
-    run = rd.simulate(
-        plant, [0.3], [0.1], duration_s=0.05, controller=law, integrator="rk4", step_s=2e-3, engine=engine
-    )
+    run = rd.simulate(plant, [0.3], [0.1], duration_s=0.05, controller=law, method="RK4", step_s=2e-3, engine=engine)
     assert run.outcome.ending == "diverged"
     assert max([0.0, run.t[-1], *(event.t for event in run.events)]) <= run.outcome.t <= 0.05

@@ -50,17 +50,17 @@ def setups() -> dict[str, rd.Setup]:
     short: dict[str, Any] = {
         "engine": "interpreted",
         "duration_s": 0.2,
-        "integrator": "DOP853",
-        "record_period_s": 0.02,
+        "method": "DOP853",
+        "record_every_s": 0.02,
     }
     return {
-        "free swing": rd.Setup(rd.Plant(ARM), Q, V, integrator="DOP853", **compiled),
+        "free swing": rd.Setup(rd.Plant(ARM), Q, V, method="DOP853", **compiled),
         "computed torque": rd.Setup(
             plant, Q, V, controller=rd.control.ComputedTorque(ARM, PLAN, 90.0, 15.0), **compiled, about={"author": "me"}
         ),
-        "sampled, rk4": rd.Setup(plant, Q, V, controller=sampled, integrator="rk4", **compiled),
+        "sampled, RK4": rd.Setup(plant, Q, V, controller=sampled, method="RK4", **compiled),
         "steps too long": rd.Setup(
-            rd.Plant(ARM), Q, 10 * V, 1.0, integrator="rk4", step_s=0.05, engine="interpreted"
+            rd.Plant(ARM), Q, 10 * V, 1.0, method="RK4", step_s=0.05, engine="interpreted"
         ),
         "stops": rd.Setup(rd.Plant(ARM, [*stops, rd.effects.Spring(3.0)]), Q, 10 * V, estimate_error=False, **short),
         "held": rd.Setup(rd.Plant(ARM, held), Q, 4 * V, estimate_error=False, **short),
@@ -154,7 +154,7 @@ def test_runs_of_one_setup_do_not_share_what_they_change(name: str) -> None:
 
 def test_threads_that_read_one_run_read_the_same() -> None:
     """What is summed up at the end, such as chatter, is so once."""
-    setup, rng = setups()["sampled, rk4"], np.random.default_rng(5)
+    setup, rng = setups()["sampled, RK4"], np.random.default_rng(5)
     reference = at_once(setup)
     for _ in range(5):
         run = rd.simulate(setup)
@@ -250,7 +250,7 @@ class Pushed(rd.effects.Active):
 @pytest.mark.parametrize("engine", ["interpreted", "auto"])
 def test_parts_that_change_between_two_calls_are_seen(engine: str) -> None:
     controller, effect = Driven(), Pushed((0.05,))
-    options: Any = {"duration_s": 0.1, "engine": engine, "integrator": "DOP853", "estimate_error": False}
+    options: Any = {"duration_s": 0.1, "engine": engine, "method": "DOP853", "estimate_error": False}
     setup = rd.Setup(rd.Plant(ARM, [effect]), Q, V, controller=controller, **options)
     before = rd.simulate(setup)
     controller.gain, effect.times = 7.0, (0.0321,)
@@ -263,7 +263,7 @@ def test_parts_that_change_between_two_calls_are_seen(engine: str) -> None:
 
 def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
     """What they raise, `simulate` raises; what they have become later tells nothing of the run."""
-    run = rd.simulate(ARM, Q, V, controller=Driven(), duration_s=0.05, integrator="DOP853", estimate_error=False)
+    run = rd.simulate(ARM, Q, V, controller=Driven(), duration_s=0.05, method="DOP853", estimate_error=False)
     assert vars(run).keys() == set(NAMES)
 
     class Stores(rd.effects.Dissipative, rd.effects.Stateful):
@@ -282,7 +282,7 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
             return 0.0
 
     with pytest.raises(LookupError, match="own"):
-        rd.simulate(rd.Plant(ARM, [Stores()]), Q, V, duration_s=0.05, integrator="DOP853", estimate_error=False)
+        rd.simulate(rd.Plant(ARM, [Stores()]), Q, V, duration_s=0.05, method="DOP853", estimate_error=False)
 
 
 def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> None:
@@ -291,7 +291,7 @@ def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> N
     changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
     counts = []
     with pytest.warns(rd.PrecisionWarning):  # so do the checks of the setup, and of its machine code
-        setup = replace(setups()["sampled, rk4"], **changes)
+        setup = replace(setups()["sampled, RK4"], **changes)
         rd.simulate(setup)
     for _ in range(2):
         with pytest.warns(rd.PrecisionWarning) as told:
@@ -303,7 +303,7 @@ def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> N
 
 def test_nothing_waits_of_a_run_that_did_not_finish() -> None:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e4)])
-    run = rd.simulate(plant, Q, V, duration_s=0.1, integrator="rk4", engine="interpreted", estimate_error=False)
+    run = rd.simulate(plant, Q, V, duration_s=0.1, method="RK4", engine="interpreted", estimate_error=False)
     assert run.outcome.ending is Ending.DIVERGED and vars(run).keys() == set(NAMES)
 
 
@@ -314,7 +314,7 @@ def test_a_text_that_is_added_to_a_setup_later_is_none_of_the_run() -> None:
     assert run.about["author"] == "me"
 
 
-@pytest.mark.parametrize("name", ["computed torque", "sampled, rk4"])
+@pytest.mark.parametrize("name", ["computed torque", "sampled, RK4"])
 def test_what_was_not_read_is_copied_pickled_and_saved_with_the_run(name: str, tmp_path: Path) -> None:
     setup = setups()[name]
     reference = at_once(setup)

@@ -29,7 +29,7 @@ def test_an_effect_that_is_neither_a_torque_nor_a_bound_is_never_evaluated_and_s
             return np.full_like(v, 7.0)
 
     q = np.array([0.3, -0.4])
-    np.testing.assert_allclose(rd.Plant(ARM, [Gust()]).torque(0.0, q, q), 7.0)
+    np.testing.assert_allclose(rd.Plant(ARM, [Gust()]).torque(q, q, t=0.0), 7.0)
 
 
 @pytest.mark.parametrize("start_s", [0.0, 0.05, 99.0])
@@ -119,8 +119,11 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
     ("text", "message"),
     [
         (SCENE + "step_s = 0.001\n", "step_s: has no effect because auto chooses its own step; remove it, or name"),
-        (SCENE + 'method = "rk4"\nrtol = 1e-8\n', "rtol: has no effect because rk4 has a fixed step"),
-        (SCENE + 'method = "gauss_6"\natol = 1e-8\n', "atol: has no effect because gauss_6 has a fixed step"),
+        (SCENE + 'method = "RK4"\nrtol = 1e-8\n', "rtol: has no effect because RK4 has a fixed step"),
+        (
+            SCENE + 'method = "GaussLegendre6"\natol = 1e-8\n',
+            "atol: has no effect because GaussLegendre6 has a fixed step",
+        ),
         (SCENE + 2 * GRAVITY, "effect: gravity is named 2 times, but only the last would act; keep one"),
         (
             SCENE + 2 * '[[effect]]\nkind = "armature"\ninertia_kg_m2 = {joint_1 = 0.1}\n',
@@ -161,7 +164,7 @@ def test_two_frictions_of_a_scene_add_up(tmp_path) -> None:
     friction = '[[effect]]\nkind = "viscous_friction"\ndamping_N_m_s_per_rad = 0.3\n'
     (tmp_path / "scene.toml").write_text(SCENE + 2 * friction)
     plant = rd.read_scene(tmp_path / "scene.toml").plant
-    np.testing.assert_allclose(plant.torque(0.0, np.ones(2), np.ones(2)), -0.6)
+    np.testing.assert_allclose(plant.torque(np.ones(2), np.ones(2), t=0.0), -0.6)
 
 
 def test_a_pid_of_a_scene_is_cut_at_the_limits_of_the_scene(tmp_path) -> None:

@@ -19,16 +19,14 @@ def ur5():
     plan = rd.control.quintic(q, q + np.array([0.3, -0.2, 0.1, 0.4, -0.3, 0.2]), 0.2)
     kp, kd = rd.control.gains_from(np.diag(arm.M(q)), 20.0)
     controller = rd.control.PD(plan, kp, kd)
-    return rd.simulate(
-        rd.Plant(arm), q0=q, v0=0 * q, duration_s=0.3, controller=controller, integrator="rk4", step_s=0.005
-    )
+    return rd.simulate(rd.Plant(arm), q0=q, v0=0 * q, duration_s=0.3, controller=controller, method="RK4", step_s=0.005)
 
 
 @cache
 def cart_pole():
     """A joint that slides and one that turns, without a reference."""
     plant = rd.Plant(rd.load("cart_pole"), [rd.effects.ViscousFriction(0.1)])
-    return rd.simulate(plant, q0=[0.1, 0.4], v0=[0.2, -0.3], duration_s=0.2, integrator="rk4", step_s=0.01)
+    return rd.simulate(plant, q0=[0.1, 0.4], v0=[0.2, -0.3], duration_s=0.2, method="RK4", step_s=0.01)
 
 
 def cells(figure, symbol: str) -> list:
@@ -57,7 +55,7 @@ def stretched(run, m: int, **changes):
     t = np.linspace(0.0, 5.0, m)
     q = np.sin(t[:, None] * np.arange(1, len(run.joint_names) + 1))
     zero = np.zeros(m)
-    made = {"t": t, "q": q, "v": q, "a": q, "u": q, "desired": None, "deviation": None, "error": None}
+    made = {"t": t, "q": q, "v": q, "a": q, "u": q, "desired": None, "tracking_error": None, "error": None}
     return replace(run, **(made | {"ledger": Ledger(zero, zero, {"control": zero})} | changes))
 
 

@@ -197,7 +197,7 @@ def test_ten_seconds_of_ur5_stay_under_fifteen_megabytes() -> None:
     plan = rd.control.via_points([0, 4, 7, 10], [q, q + 1, q - 0.5, q])
     kp, kd = rd.control.gains_from(1.0, frequency=20.0)
     drive = rd.control.ComputedTorque(arm, plan, kp, kd)
-    run = rd.simulate(arm, q, duration_s=10.0, controller=drive, integrator="rk4", estimate_error=False)
+    run = rd.simulate(arm, q, duration_s=10.0, controller=drive, method="RK4", estimate_error=False)
     assert len(run.t) == 10_001
     assert len(rd.replay(run).text.encode()) < 15e6
 

@@ -46,7 +46,7 @@ def test_keyframes_follow_the_motion_between_samples_as_far_as_is_said(period: f
     """A fast swing, held to the same run with a sample each ms: lines between the samples alone would be far off."""
     arm = rd.load("planar_2r")
     swing = rd.Setup(rd.Plant(arm), [0.4, 0.9], [3.0, -5.0], duration_s=1.0, estimate_error=False)
-    dense, run = (rd.simulate(swing, record_period_s=p, integrator="order_8", step_s=1e-3) for p in (1e-3, period))
+    dense, run = (rd.simulate(swing, record_every_s=p, method="DP8", step_s=1e-3) for p in (1e-3, period))
     motion = motion_of(run)
     keys = keyframes(motion.t, motion.q)
     drawn = np.stack([np.interp(dense.t, keys.t, column) for column in keys.q.T], axis=1)

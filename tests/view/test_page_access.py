@@ -28,7 +28,7 @@ def sticking(payload: float = 0.0) -> rd.Trajectory:
         rd.effects.RigidStops([-2.0, -2.0], [0.6, 2.0], 0.4),
     ]
     return rd.simulate(
-        rd.Plant(loaded, effects), q0=[0.4, -0.7], duration_s=0.8, record_period_s=0.01, controller=law,
+        rd.Plant(loaded, effects), q0=[0.4, -0.7], duration_s=0.8, record_every_s=0.01, controller=law,
         estimate_error=False,
     )  # fmt: skip
 

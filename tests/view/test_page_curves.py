@@ -15,7 +15,7 @@ SPANS = "replay.plots.figures.map((each) => [each.scales.x.min, each.scales.x.ma
 @pytest.fixture(scope="module")
 def run():
     arm = rd.load("planar_2r")
-    return rd.simulate(arm, q0=[0.4, -0.7], duration_s=1.0, record_period_s=0.002, estimate_error=False)
+    return rd.simulate(arm, q0=[0.4, -0.7], duration_s=1.0, record_every_s=0.002, estimate_error=False)
 
 
 @pytest.fixture(scope="module")

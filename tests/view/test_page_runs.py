@@ -18,7 +18,7 @@ def followed(mass: float) -> rd.Trajectory:
     loaded = arm.with_(payload=rd.Payload("tip", mass)) if mass else arm
     plan = rd.control.quintic([0.4, -0.7], [0.6, -0.4], 0.3)
     law = rd.control.ComputedTorque(arm, plan, 100.0, 20.0)
-    return rd.simulate(loaded, q0=[0.4, -0.7], duration_s=0.4, record_period_s=0.01, controller=law)
+    return rd.simulate(loaded, q0=[0.4, -0.7], duration_s=0.4, record_every_s=0.01, controller=law)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def test_two_runs_show_desired_motion_difference_and_settings(browser, runs, wid
     a, b = runs
     with opened(browser, rd.replay(a, b), size=(width, 900), color_scheme=scheme) as view:
         titles = view.ask(TITLES)
-        assert titles[0] == "joint positions q, desired dotted" and "tracking error q − q_d" in titles
+        assert titles[0] == "joint positions q, desired dotted" and "tracking error q_d − q" in titles
         (number,) = [k for k, each in enumerate(titles) if each.startswith("difference of q, payload on tip 0.5 kg − ")]
         assert "they part at t = 0.01 s" in titles[number]
         drawn = np.array(view.ask(f"replay.plots.figures[{number}].data.map((each) => [...each])"), dtype=float)

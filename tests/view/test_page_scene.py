@@ -14,7 +14,7 @@ Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
 
 @pytest.fixture(scope="module")
 def run():
-    return rd.simulate(rd.load("ur5"), q0=Q, duration_s=0.8, record_period_s=0.005, estimate_error=False)
+    return rd.simulate(rd.load("ur5"), q0=Q, duration_s=0.8, record_every_s=0.005, estimate_error=False)
 
 
 @pytest.fixture(scope="module")

@@ -144,7 +144,8 @@ def test_the_panel_of_a_long_run_takes_little_room(run: rd.Trajectory) -> None:
                      work={name: work[every] for name, work in run.ledger.work.items()})  # fmt: skip
     power = {name: each[every] for name, each in run.power.items()}
     arrays = {
-        name: getattr(run, name)[every] for name in ("q", "v", "a", "u", "desired", "desired_velocity", "deviation")
+        name: getattr(run, name)[every]
+        for name in ("q", "v", "a", "u", "desired", "desired_velocity", "tracking_error")
     }
     long = replace(run, t=t, effect_torques=torques, ledger=ledger, power=power, events=(), **arrays)
     document = rd.replay(long).document

@@ -23,7 +23,7 @@ def batch(fast: float) -> rd.Rollouts:
     reference = rd.control.quintic(Q, Q + 0.5, 0.1)
     controller = rd.control.PD(reference, 40.0, [4.0, 3.0])
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([0.3, 0.1])])
-    setup = rd.Setup(plant, Q, duration_s=0.2, controller=controller, integrator="rk4", step_s=2e-3)
+    setup = rd.Setup(plant, Q, duration_s=0.2, controller=controller, method="RK4", step_s=2e-3)
     q0 = Q + 0.3 * np.random.default_rng(3).normal(size=(COUNT, 2))
     v0 = np.full((COUNT, 2), 0.3)
     v0[LOST] = [0.01 * fast, fast] if fast else 0.3
@@ -61,11 +61,11 @@ def test_bands_are_numpys_quantiles_of_the_runs_that_did_not_diverge(runs, some_
 
 
 def test_the_fan_of_tracking_is_of_the_error_of_each_run(runs) -> None:
-    off = np.array([run.deviation for run in runs])
+    off = np.array([run.tracking_error for run in runs])
     for i, axes in enumerate(plot(runs, "tracking").axes):
         drawn = lines(axes, "median")[0].get_ydata()
         np.testing.assert_allclose(drawn, np.median(off[:, :, i], axis=0), rtol=0, atol=1e-15)
-        assert axes.get_ylabel() == "q − q_d [rad]"
+        assert axes.get_ylabel() == "q_d − q [rad]"
 
 
 def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> None:
@@ -106,9 +106,9 @@ def test_columns_are_those_of_the_table_with_their_units(runs) -> None:
     """By default the tracking error over what was swept; others with or without their unit."""
     table = runs.table()
     (axes,) = plot(runs, "scatter").axes
-    assert axes.get_xlabel() == "kp joint_1 [N m/rad]" and axes.get_ylabel().startswith("tracking error [")
+    assert axes.get_xlabel() == "kp joint_1 [N m/rad]" and axes.get_ylabel().startswith("rms tracking error [")
     np.testing.assert_array_equal(
-        axes.lines[0].get_xydata(), np.column_stack([runs.params["kp"][:, 0], runs.tracking_error])
+        axes.lines[0].get_xydata(), np.column_stack([runs.params["kp"][:, 0], runs.rms_tracking_error])
     )
     (axes,) = plot(runs, "scatter", x="start q joint_2", y="largest v joint_1 [rad/s]").axes
     expected = np.column_stack([runs.q0[:, 1], table["largest v joint_1 [rad/s]"]])

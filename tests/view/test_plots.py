@@ -18,7 +18,7 @@ from matplotlib.text import Text
 import robot_dyn as rd
 from robot_dyn import plot
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation import Ledger, Outcome, Reason
+from robot_dyn.simulation import Doubt, DoubtKind, Ledger, Outcome, Reason
 from robot_dyn.view import PLOTS, PlotError
 from robot_dyn.view.plots.plots import MOST_JOINTS
 from tests.long import long
@@ -48,16 +48,16 @@ def test_positions_and_velocities_are_the_runs_and_desired_ones_dashed(run, cart
     assert not any(lines(axes, "desired") for axes in plot(cart, "joints").axes)
 
 
-def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
+def test_tracking_plots_the_tracking_error_with_its_rms(run, cart) -> None:
     """Of joints, or of a frame, which the overview has, too."""
     figure = plot(run, "tracking")
-    for axes, column in zip(figure.axes, run.deviation.T, strict=True):
+    for axes, column in zip(figure.axes, run.tracking_error.T, strict=True):
         np.testing.assert_array_equal(axes.lines[0].get_ydata(), column)
-    assert f"rms {run.tracking_error:.2e} rad" in headings(figure)
+    assert f"rms {run.rms_tracking_error:.2e} rad" in headings(figure)
     for names in ((), ("tracking",)):
-        frame = cells(plot(replace(run, desired=None, deviation=run.deviation[:, :3]), *names), "p − p_d")
+        frame = cells(plot(replace(run, desired=None, tracking_error=run.tracking_error[:, :3]), *names), "p_d − p")
         assert [axes.get_title(loc="left") for axes in frame] == ["frame, x", "frame, y", "frame, z"]
-        assert {axes.get_ylabel() for axes in frame} == {"p − p_d [m]"}
+        assert {axes.get_ylabel() for axes in frame} == {"p_d − p [m]"}
     with pytest.raises(PlotError, match="no reference"):
         plot(cart, "tracking")
 
@@ -226,7 +226,7 @@ def test_small_numbers_at_logarithmic_axes_are_powers_with_few_digits(run) -> No
 
 
 def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
-    error = replace(run.error, until_s=0.1, note="not resolved")
+    error = replace(run.error, until_s=0.1, ends_early=Doubt(DoubtKind.COMPANIONS_DIFFER))
     (axes,) = plot(replace(run, error=error), "error_growth").axes
     (veil,) = axes.patches
     assert veil.get_x() == pytest.approx(0.1) and axes.get_yscale() == "log"
@@ -296,7 +296,7 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     energy = Ledger(growth[:, 0], growth[:, 1], {"control": growth[:, 0]})
     end = Outcome(Reason.STATE_OVERFLOWS, 5.0)
     fast = {"q": growth, "v": growth, "u": growth, "ledger": energy, "outcome": end}
-    run = stretched(cart, 200, **fast, deviation=growth, desired=growth)
+    run = stretched(cart, 200, **fast, tracking_error=growth, desired=growth)
     plot(run).save(tmp_path / "diverged.png", dpi=40)
     figure = plot(run)
     assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
@@ -343,15 +343,15 @@ def eight():
     one = replace(many(run, 8), extremes=None)
     works = {f"source_{k}": np.sin(one.t + k) for k in range(4)}
     ledger = replace(run.ledger, kinetic=one.t, potential=np.cos(one.t), work=works)
-    return replace(one, desired=one.q + 0.1, deviation=-0.1 + 0 * one.q, ledger=ledger, error=run.error)
+    return replace(one, desired=one.q + 0.1, tracking_error=0.1 + 0 * one.q, ledger=ledger, error=run.error)
 
 
 def test_the_overview_is_the_runs(run) -> None:
-    """A row for each joint, with q and q_d, v, u and q − q_d; then energy, work, residual and estimated error."""
+    """A row for each joint, with q and q_d, v, u and q_d − q; then energy, work, residual and estimated error."""
     figure, n = plot(run), len(run.joint_names)
     columns = [figure.axes[k : 4 * n : 4] for k in range(4)]
     for column, values, symbol in zip(
-        columns, (run.q, run.v, run.u, run.deviation), ("q", "v", "u", "q − q_d"), strict=True
+        columns, (run.q, run.v, run.u, run.tracking_error), ("q", "v", "u", "q_d − q"), strict=True
     ):
         for axes, expected in zip(column, values.T, strict=True):
             np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack([run.t, expected]))
@@ -372,7 +372,7 @@ def test_what_a_run_lacks_has_no_axes(run) -> None:
     """A swing without control, reference or estimate: q, v, the ledger. That u is 0 is said."""
     cart = replace(cart_pole(), error=None)
     figure = plot(cart)
-    assert not cells(figure, "q − q_d") and not cells(figure, "u") and "u is 0 throughout" in headings(figure)
+    assert not cells(figure, "q_d − q") and not cells(figure, "u") and "u is 0 throughout" in headings(figure)
     assert not any("Estimated" in axes.get_title(loc="left") for axes in figure.axes)
     assert "u is 0" not in headings(plot(run))
     unknown = plot(replace(cart, u=np.full_like(cart.u, np.nan)))  # not recorded, which is not 0

@@ -24,7 +24,7 @@ def fall():
     arm = rd.load("ur5")
     push = rd.effects.ExternalWrench("ee_link", [20.0, 0, 10, 0, 2, 0], start_s=0.2, end_s=0.7)
     effects = [rd.effects.ViscousFriction(1.0), push, *rd.effects.joint_stops(arm.lower * 0 - 1.2, arm.upper * 0 + 2.2)]
-    return rd.simulate(rd.Plant(arm, effects), q0=UR5_Q, duration_s=1.0, record_period_s=0.005, estimate_error=False)
+    return rd.simulate(rd.Plant(arm, effects), q0=UR5_Q, duration_s=1.0, record_every_s=0.005, estimate_error=False)
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +194,7 @@ def test_events_are_marked_on_the_plots_and_named_as_they_occur(browser) -> None
     """A dotted line at each event, where the axis has its time; its name stands in the scene for a while after it."""
     arm = rd.load("planar_2r")
     struck = rd.Plant(arm, rd.effects.joint_stops([-0.2, -1.5], [2.0, 1.5], 2e3, 20.0))
-    run = rd.simulate(struck, q0=[0.4, -0.7], duration_s=0.6, estimate_error=False, record_period_s=0.01)
+    run = rd.simulate(struck, q0=[0.4, -0.7], duration_s=0.6, estimate_error=False, record_every_s=0.01)
     assert len(run.events) > 1
     first = run.events[0]
     with opened(browser, rd.replay(run)) as view:
@@ -213,7 +213,7 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser) -> None:
     """Its numbers are those of the run; that they can be read, axe finds."""
     plant = rd.Plant(rd.load("planar_2r"), [rd.effects.ViscousFriction(0.2)])
     run = rd.simulate(plant, [0.4, -0.7], duration_s=0.3, accuracy=1e-6, engine="interpreted")
-    coarse = rd.simulate(plant, [0.4, -0.7], duration_s=0.3, integrator="rk4", step_s=0.01, estimate_error=False)
+    coarse = rd.simulate(plant, [0.4, -0.7], duration_s=0.3, method="RK4", step_s=0.01, estimate_error=False)
     accuracy = run.accuracy
     assert accuracy is not None and run.error is not None
     rows = "[...document.querySelectorAll('.price tr')].map((row) => [...row.cells].map((cell) => cell.textContent))"
@@ -222,8 +222,8 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser) -> None:
         head, *table = view.ask(rows)
         *others, price = view.ask(boxes)
     told = {line[0]: line[1:] for line in table}
-    assert head == ["", "method DOP853, …", "method rk4, …"]
-    assert told["method"] == [run.statistics.method, "rk4, step 0.01 s"]
+    assert head == ["", "method DOP853, …", "method RK4, …"]
+    assert told["method"] == [run.statistics.method, "RK4, step 0.01 s"]
     assert told["steps"] == [str(run.statistics.steps), "30"]
     assert told["evaluations"] == [str(run.statistics.evaluations), "120"]
     assert told["estimated error of q [rad]"] == [str(run.error), "not estimated"]
@@ -238,7 +238,7 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser) -> None:
 
 @pytest.fixture(scope="module")
 def swing():
-    return rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, integrator="rk4", estimate_error=False)
+    return rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, method="RK4", estimate_error=False)
 
 
 def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
@@ -267,7 +267,7 @@ def test_runs_that_cannot_be_shown_say_why(swing) -> None:
     arrays = {name: getattr(swing, name)[:0] for name in ("t", "q", "v", "a", "u")}
     for why, changes in (
         ("no samples", arrays),
-        ("carries no URDF", {"about": {}}),
+        ("contains no URDF", {"about": {}}),
         ("not those of its URDF", {"joint_names": ("a", "b")}),
         ("edits that the run carries", {"about": swing.about | {"edits": json.dumps({"gravity": 1})}}),
     ):

@@ -24,7 +24,7 @@ def fall() -> rd.Trajectory:
     plant = rd.Plant(RAIL, [rd.effects.DryFriction(12.0), rd.effects.RigidStops(-0.1, np.inf)])
     pull = lambda t, q, v: np.array([-4.0 * t])  # noqa: E731
     return rd.simulate(plant, [0.0], [2.0], duration_s=3.0, controller=pull, estimate_error=False,
-                       record_period_s=0.0371)  # fmt: skip
+                       record_every_s=0.0371)  # fmt: skip
 
 
 def test_a_joint_rests_from_where_it_sticks_to_where_it_breaks_away(fall) -> None:

@@ -31,7 +31,7 @@ FPS = 10
 @pytest.fixture(scope="module")
 def motion() -> rd.Trajectory:
     arm = rd.load("planar_2r")
-    return rd.simulate(arm, q0=[0.4, -0.7], duration_s=0.5, record_period_s=0.01, estimate_error=False)
+    return rd.simulate(arm, q0=[0.4, -0.7], duration_s=0.5, record_every_s=0.01, estimate_error=False)
 
 
 @pytest.fixture(scope="module")

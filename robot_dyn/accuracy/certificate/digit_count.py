@@ -58,8 +58,8 @@ def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> 
     """Answers at states (S, n), some at a time, eight of machine code side by side; NaN where there is none."""
     rows = [states[name] for name in quantity.arguments]
     parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
-    answer = getattr(engine, quantity.name)
-    return np.concatenate([answer(*(x[part] for x in rows), errors="nan") for part in parts])
+    answer = getattr(engine.nan_rows, quantity.name)
+    return np.concatenate([answer(*(x[part] for x in rows)) for part in parts])
 
 
 def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
@@ -88,14 +88,15 @@ def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
 
 
 def _articulated_body(robot: Robot) -> SimpleNamespace:
-    """Forward dynamics by articulated bodies, with the signature of `Dynamics`."""
+    """Forward dynamics by articulated bodies, in the place of a `Dynamics`."""
     own = Lagrangian(robot)
     equation = partial(articulated_body, own.linkage)
 
-    def forward_dynamics(q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
-        return answered(equation, {"q": q, "v": v, "tau": tau}, (own.n,), own.joint_names, errors, FLOAT64)
+    def forward_dynamics(q: Array, v: Array, tau: Array, *, nan: bool = False) -> Array:
+        return answered(equation, {"q": q, "v": v, "tau": tau}, (own.n,), own.joint_names, nan, FLOAT64)
 
-    return SimpleNamespace(forward_dynamics=forward_dynamics)
+    with_nan = SimpleNamespace(forward_dynamics=partial(forward_dynamics, nan=True))
+    return SimpleNamespace(forward_dynamics=forward_dynamics, nan_rows=with_nan)
 
 
 @final

@@ -1,4 +1,4 @@
-"""What algorithms cost on an arm, by the same kernels as of `Compiled`: for many states side by side on one thread.
+"""What algorithms cost on an arm, by the kernels of `compiled`: for many states side by side on one thread.
 
 full C(q, v) against C(q, v) v;   M = L D Lᵀ against articulated bodies;   C v in forward dynamics, on and off;
 ∂a/∂(q, v, τ) exact against central differences, 6 n evaluations;   float64 against float32

@@ -113,7 +113,7 @@ def side_by_side(setup: Setup) -> ABComparison:
 def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _IN_LANES) -> Version:
     """A step and run of many side by side."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = translate(_equation(short), short.integrator, lanes=LANES)
+    made = translate(_equation(short), short.method, lanes=LANES)
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
@@ -128,7 +128,7 @@ def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _
 def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Version:
     """A step of one run."""
     short = _short(setup, _STEPS)
-    made = translate(_equation(short), short.integrator)
+    made = translate(_equation(short), short.method)
 
     def run() -> float:
         state = RunState(short, replace(made, equation=made.compiled_form), segment_table(short), None)
@@ -161,6 +161,6 @@ def _short(setup: Setup, steps: int) -> Setup:
         controller = controller.at_period(_STEP_S)
     duration = steps * _STEP_S
     return replace(
-        setup, controller=controller, integrator=method("rk4"), step_s=_STEP_S, duration_s=duration,
-        record_period_s=duration, estimate_error=False, accuracy=None, events=(), engine="compiled",
+        setup, controller=controller, method=method("RK4"), step_s=_STEP_S, duration_s=duration,
+        record_every_s=duration, estimate_error=False, accuracy=None, events=(), engine="compiled",
     )  # fmt: skip

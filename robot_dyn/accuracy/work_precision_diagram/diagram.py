@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LOOK = {  # theme colour and marker, by family: explicit, Gauss, stiff, adaptive
-    "DOP853": (0, "o"), "Rosenbrock": (3, "o"), "order_8": (6, "s"), "rk4": (1, "D"), "midpoint": (5, "<"),
-    "explicit_euler": (5, "^"), "semi_implicit_euler": (5, "v"), "gauss_2": (2, "<"), "gauss_4": (2, ">"),
-    "gauss_6": (2, "h"), "rosenbrock_5": (3, "s"),
+    "DOP853": (0, "o"), "Rodas5P": (3, "o"), "DP8": (6, "s"), "RK4": (1, "D"), "Midpoint": (5, "<"),
+    "Euler": (5, "^"), "SemiImplicitEuler": (5, "v"), "GaussLegendre2": (2, "<"), "GaussLegendre4": (2, ">"),
+    "GaussLegendre6": (2, "h"), "Rodas5PFixed": (3, "s"),
 }  # fmt: skip
 _PEERS = {
     "SciPy DOP853 + pin.aba": "x", "SciPy Radau + pin.aba": "+", "SciPy LSODA + pin.aba": "1", "MuJoCo RK4": "D",
@@ -120,7 +120,7 @@ def _curve(axes: Any, ladder: ToleranceLadder, colours: Colours, x: str, y: str,
     points = _shown(ladder, x, y)
     places = np.array([(getattr(p, x), getattr(p, y)) for p in points]).reshape(-1, 2)
     style = "--" if ladder.peer else "-" if ladder.events else ":"
-    bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
+    bold = 1.9 if ladder.method in ("DOP853", "Rodas5P") else 1.1
     axes.plot(*places.T, style, color=colour, linewidth=size * bold)
     filled = np.array([p.believed and p.repeatable for p in points], bool)
     for some, face in ((places[filled], colour), (places[~filled], colours["paper"])):

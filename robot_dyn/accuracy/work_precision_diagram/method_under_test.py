@@ -47,7 +47,7 @@ _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # steps per record period in runs that load machine code
 _UNKNOWN = 15  # order assumed for a method that chooses its own
 ATOL = 1e-2  # absolute tolerance over the relative one, as in `Adaptive`
-ORDERS = {"DOP853": 8, "Rosenbrock": 5}  # of methods that choose their steps
+ORDERS = {"DOP853": 8, "Rodas5P": 5}  # of methods that choose their steps
 
 
 @final
@@ -224,8 +224,8 @@ def whole(setup: Setup) -> Setup:
 def recorded(setup: Setup, duration_s: float) -> Setup:
     """The setup up to `duration_s`, with about RECORDS records and no error estimate."""
     return replace(
-        setup, integrator=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
-        duration_s=duration_s, record_period_s=_record_period(setup, duration_s),
+        setup, method=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
+        duration_s=duration_s, record_every_s=_record_period(setup, duration_s),
     )  # fmt: skip
 
 
@@ -265,28 +265,28 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
         engine: "compiled" or "interpreted".
         events: Whether steps end at the thresholds of the effects.
     """
-    setup = replace(setup, integrator=made, engine=engine)
+    setup = replace(setup, method=made, engine=engine)
 
     def run(setting: float, limit: Limit) -> Run:
         return timed(at_setting(setup, setting), limit, events)
 
     order, by, settings = ORDERS.get(made.name), "tolerance", tolerances
     if not made.controls_error:
-        order, by, settings = made.order, "step", partial(_steps, setup, events)
+        order, by, settings = made.order, "step", partial(_steps, setup, made.order, events)
     return MethodUnderTest(made.name, engine, events, order, by, settings, run, lambda: warmed(setup))
 
 
 def at_setting(setup: Setup, setting: float) -> Setup:
     """The setup with its method at a step, in [s], or a relative tolerance."""
-    if setup.integrator.controls_error:
-        return replace(setup, integrator=replace(setup.integrator, rtol=setting, atol=ATOL * setting))
+    if isinstance(setup.method, Adaptive):
+        return replace(setup, method=replace(setup.method, rtol=setting, atol=ATOL * setting))
     return replace(setup, step_s=setting)
 
 
-def _steps(setup: Setup, events: bool) -> Iterator[float]:
+def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
     """Steps from the record period on, up to the number that a run may take."""
     before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # of more steps none ends at an event
-    for step in step_ladder(setup.record_period_s, setup.integrator.order):
+    for step in step_ladder(setup.record_every_s, order):
         count = at_setting(setup, step).steps
         if count > most:
             return
@@ -312,9 +312,9 @@ def step_ladder(period_s: float, order: int) -> Iterator[float]:
 
 def warmed(setup: Setup) -> None:
     """Run one or a few steps to load the machine code that the setup needs."""
-    step = setup.record_period_s / _WARM
-    setup = setup if setup.integrator.controls_error else replace(setup, step_s=step)
-    timed(replace(setup, duration_s=2 * step, record_period_s=step), Budget().check)
+    step = setup.record_every_s / _WARM
+    setup = setup if setup.method.controls_error else replace(setup, step_s=step)
+    timed(replace(setup, duration_s=2 * step, record_every_s=step), Budget().check)
 
 
 def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
@@ -331,7 +331,7 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
         raise KeyboardInterrupt
     finished = record.outcome.ending is Ending.FINISHED
     met = np.ones(len(record.t), bool)
-    if not setup.integrator.controls_error and record.ends is not None:
+    if not setup.method.controls_error and record.ends is not None:
         met = common(record.t, np.append(0.0, record.ends)) >= 0
     return Run(
         record.t[met], record.y[met, : setup.plant.dynamics.n] if finished else None,

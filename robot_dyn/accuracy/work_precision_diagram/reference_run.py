@@ -54,8 +54,8 @@ _LATE = 3  # runs of one method that may take too long
 _LOST = 0.1  # [rad] or [m]: runs that far apart have nothing in common
 _LEAST = 1e-3  # of the duration: a horizon that is shorter shows nothing
 _ULPS = 4.0  # of rounding in any position
-_FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-12, 1e-14))
-_SECOND = ("gauss_6", "rosenbrock_5")
+_FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-12, 1e-14))
+_SECOND = ("GaussLegendre6", "Rodas5PFixed")
 _SHARE, _LEAST_S = 0.08, 0.5  # of the budget, for one run; and at least, in [s]
 _PART = 0.02  # of the budget, for one run
 
@@ -116,7 +116,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
         if parted is None:
             parted, lost = _rough_ends(setup, run, q, size, budget)
             if parted is not None:
-                setup = replace(setup, duration_s=parted, record_period_s=0.0)
+                setup = replace(setup, duration_s=parted, record_every_s=0.0)
                 continue
         other = _second(setup, run, q, budget)
         end = _passes(other.t, other.distance, size * (_PARTED if other.refined else _COARSE))
@@ -129,7 +129,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
                 f"{first} and {other.words} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
                 " measured; take a shorter run, or a start that is less sensitive"
             )
-        setup = replace(setup, duration_s=end, record_period_s=0.0)
+        setup = replace(setup, duration_s=end, record_every_s=0.0)
 
 
 def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
@@ -137,7 +137,7 @@ def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
     for tight in _FIRST:
         description = f"{tight.name}, rtol {tight.rtol:g}"
         budget.report(f"reference: {description}")
-        run = _in_time(replace(setup, integrator=tight), budget)
+        run = _in_time(replace(setup, method=tight), budget)
         if run is not None and run.q is not None:
             return description, run.t, run.q
     raise HorizonError(
@@ -150,7 +150,7 @@ def _rough_ends(
     setup: Setup, t: np.ndarray, q: np.ndarray, size: float, budget: Budget
 ) -> tuple[float | None, float | None]:
     """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
-    run = _in_time(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
+    run = _in_time(replace(setup, method=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
     if run is None or run.q is None:
         return None, None
     times, distance = _distance(t, q, run)
@@ -186,7 +186,7 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
     """The finest run by another method."""
     for name in _SECOND:
         try:
-            setup_of_other = replace(setup, integrator=method(name))
+            setup_of_other = replace(setup, method=method(name))
         except QueryError:  # it cannot end its steps where joints are held, say
             continue
         if runs := list(_refined(setup_of_other, t, q, budget)):
@@ -199,8 +199,8 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
 def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
-    for step in step_ladder(setup.record_period_s, 1):
-        words = f"{setup.integrator.name}, step {step:.3g} s"
+    for step in step_ladder(setup.record_every_s, 1):
+        words = f"{setup.method.name}, step {step:.3g} s"
         budget.report(f"reference: {words}")
         run = _in_time(replace(setup, step_s=step), budget)
         late += run is None  # steps that are too long may bring forth a motion that takes longer
@@ -273,7 +273,7 @@ def past_horizon(
         budget.report(f"beyond the horizon: {ladder.name}")
         with suppress(OvertimeError, RobotDynError):
             setting = in_time[-1].setting
-            finest = replace(setup, integrator=integrators[ladder.method], engine=ladder.engine)
+            finest = replace(setup, method=integrators[ladder.method], engine=ladder.engine)
             finest = at_setting(finest, setting)
             with budget.apart():
                 warmed(finest)

@@ -42,13 +42,13 @@ from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
 # In this order, should the budget end: first what is most used and what costs least.
-_FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
+_FIRST = ("DOP853", "RK4", "DP8", "Euler", "Rodas5P", "GaussLegendre6", "GaussLegendre4", "Midpoint")
 _MOST_REPEATS, _MOST_DIGITS = 1000, 20
 _DIGITS = (3, 6, 9)  # of the columns
 _OWN = "robot_dyn"  # this program
 _USUAL_DIGITS = 6  # digits, of the sentence
 _ENOUGH = 5  # methods of a sentence: with so many, none that is extrapolated is named
-_ALWAYS_NAMED = ("rk4", "rk4 (without events)", "explicit_euler")
+_ALWAYS_NAMED = ("RK4", "RK4 (without events)", "Euler")
 
 
 @final
@@ -249,7 +249,7 @@ def work_precision(
     setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
     if methods is None:
         methods = [*_FIRST, *(name for name in METHODS if name not in (*_FIRST, AUTO))]
-    instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'rk4']")
+    instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'RK4']")
     integrators = [as_method(each) for k, each in enumerate(methods) if each not in methods[:k]]
     if any(each.name == AUTO for each in integrators):
         raise QueryError(f"methods: {AUTO!r} is one of {EXPLICIT!r} and {STIFF!r}; name these")
@@ -304,7 +304,7 @@ def _able(setup: Setup, integrators: list[Any]) -> tuple[list[Any], list[str]]:
     able, why = [], []
     for each in integrators:
         try:
-            able.append(replace(setup, integrator=each).integrator)
+            able.append(replace(setup, method=each).method)
         except QueryError as error:
             why.append(f"{each.name}: {error}")
     return able, why

@@ -94,7 +94,7 @@ def query(
     if setup is not None and a is None and tau is None:
         torque = _actuation(setup, at, speed)
     acceleration = arguments.vector("--a", a, names) if torque is None else None
-    state = plant_state(plant, at, speed, acceleration, torque)
+    state = plant_state(plant, at, speed, acceleration, torque, t=0.0)
     cause = {} if why is None else {"why": why_at(state, why)}
     answers = report.queries(state, quantity or (), frame)
     text = [state, *report.query_lines(answers, names, state.types)]

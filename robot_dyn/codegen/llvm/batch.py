@@ -6,7 +6,7 @@ possible, and loads and shuffles fill the gaps in long chains of products.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 from llvmlite import ir
 
@@ -26,7 +26,7 @@ def lanes(kind: ir.Type) -> int:
 
 def batch_function(
     module: ir.Module, name: str, program: Program, kind: ir.Type, limits: Limits, parameters: bool
-) -> Any:
+) -> ir.Function:
     """Write the function for a batch of at least L states; the last vector may overlap the previous one.
 
     With `parameters` the last input is one row, the same for all states.
@@ -59,8 +59,13 @@ def batch_function(
 
 
 def _group(
-    writer: Writer, program: Program, arrays: list[Any], at: Any, before: list[Any], parameters: bool
-) -> tuple[Any, Any, Any]:
+    writer: Writer,
+    program: Program,
+    arrays: Sequence[ir.Value],
+    at: ir.Value,
+    before: Sequence[ir.Value],
+    parameters: bool,
+) -> tuple[ir.Value, ir.Value, ir.Value]:
     """Load, compute and store L states from `at` on; return Σ |x|, Σ |y| and the mask of far angles, accumulated."""
     vectors, (*inputs, y) = writer.vectors, arrays
     pairs = list(zip(inputs, program.inputs, strict=True))

@@ -6,8 +6,6 @@ the function is a bytes object with the parameters, if there are any.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from llvmlite import ir
 
@@ -23,7 +21,7 @@ _LARGEST_NARROW = LEAST_EXACT / float(np.finfo(np.float32).eps)
 def write_state_entry(
     module: ir.Module,
     name: str,
-    state: Any,
+    state: ir.Function,
     inputs: tuple[int, ...],
     shape: tuple[int, ...],
     timed: bool,
@@ -33,7 +31,7 @@ def write_state_entry(
 
     With `parameters` the function receives the numbers of `self` before y.
     """
-    shapes, kind = [*((n,) for n in inputs[timed:]), shape], state.args[0].type.pointee
+    shapes, kind = [*((n,) for n in inputs[timed:]), shape], _kind(state)
     builder, own, objects, views, status = _entry(module, name, len(inputs) + 1, len(shapes))
     times = [_number(builder, objects[0], kind, status)] if timed else []  # first, as it may run Python code
     pointers = _data(builder, objects[timed:], views, kind, list(map(len, shapes)), status)
@@ -46,10 +44,10 @@ def write_state_entry(
 
 
 def write_batch_entry(
-    module: ir.Module, name: str, batch: Any, inputs: tuple[int, ...], outputs: int, parameters: bool
+    module: ir.Module, name: str, batch: ir.Function, inputs: tuple[int, ...], outputs: int, parameters: bool
 ) -> None:
     """Write the entry (x₁, …, y, start, stop) of a function of batches: arrays (B, nᵢ), y (B, m), not overlapping."""
-    kind, widths = batch.args[0].type.pointee, [ir.Constant(I64, n) for n in (*inputs, outputs)]
+    kind, widths = _kind(batch), [ir.Constant(I64, n) for n in (*inputs, outputs)]
     builder, own, (*objects, start, stop), views, status = _entry(module, name, len(widths) + 2, len(widths))
     pointers = _data(builder, objects, views, kind, [2] * len(views), status)
     states = builder.load(arrays.field(builder, views[-1], "lengths"))
@@ -67,7 +65,16 @@ def write_batch_entry(
     _answer(builder, result, status)
 
 
-def _entry(module: ir.Module, name: str, count: int, arrays_: int) -> tuple[Any, Any, list[Any], list[Any], Any]:
+def _kind(function: ir.Function) -> ir.Type:
+    """Return the type of the numbers of a function of states."""
+    pointer = function.args[0].type
+    assert isinstance(pointer, ir.PointerType)
+    return pointer.pointee
+
+
+def _entry(
+    module: ir.Module, name: str, count: int, arrays_: int
+) -> tuple[ir.IRBuilder, ir.Value, list[ir.Value], list[ir.Value], ir.PhiInstr]:
     """Write the frame of a Python function: return its builder, `self`, the arguments, views, and the status.
 
     The block of the status releases the views, also those still empty, and returns the status.
@@ -80,11 +87,18 @@ def _entry(module: ir.Module, name: str, count: int, arrays_: int) -> tuple[Any,
     end.ret(api(end, "PyLong_FromLongLong", status))
     own, arguments, number = function.args
     _require(builder, [builder.icmp_signed("==", number, ir.Constant(I64, count))], status)
-    objects = [builder.load(builder.gep(arguments, [ir.Constant(I32, i)])) for i in range(count)]
+    objects: list[ir.Value] = [builder.load(builder.gep(arguments, [ir.Constant(I32, i)])) for i in range(count)]
     return builder, own, objects, views, status
 
 
-def _data(builder: Any, objects: list[Any], views: list[Any], kind: ir.Type, axes: list[int], status: Any) -> list[Any]:
+def _data(
+    builder: ir.IRBuilder,
+    objects: list[ir.Value],
+    views: list[ir.Value],
+    kind: ir.Type,
+    axes: list[int],
+    status: ir.PhiInstr,
+) -> list[ir.Value]:
     """Return pointers to the numbers of C-contiguous arrays with these numbers of axes; the last is writeable."""
     for value, view, count in zip(objects, views, axes, strict=True):
         _require(builder, [arrays.is_array(builder, value)], status)
@@ -96,14 +110,14 @@ def _data(builder: Any, objects: list[Any], views: list[Any], kind: ir.Type, axe
     return [builder.bitcast(arrays.field(builder, view, "data"), kind.as_pointer()) for view in views]
 
 
-def _with_own(builder: Any, pointers: list[Any], own: Any, parameters: bool) -> list[Any]:
+def _with_own(builder: ir.IRBuilder, pointers: list[ir.Value], own: ir.Value, parameters: bool) -> list[ir.Value]:
     """Return the pointers to x₁, …, y, with that to the parameters before y."""
     if not parameters:
         return pointers
     return [*pointers[:-1], builder.bitcast(api(builder, "PyBytes_AsString", own), pointers[-1].type), pointers[-1]]
 
 
-def _require(builder: Any, conditions: list[Any], status: Any) -> None:
+def _require(builder: ir.IRBuilder, conditions: list[ir.Value], status: ir.PhiInstr) -> None:
     """Report a SHAPE unless all conditions hold."""
     block = builder.append_basic_block()
     status.add_incoming(ir.Constant(I64, int(Status.SHAPE)), builder.block)
@@ -111,13 +125,13 @@ def _require(builder: Any, conditions: list[Any], status: Any) -> None:
     builder.position_at_end(block)
 
 
-def _answer(builder: Any, found: Any, status: Any) -> None:
+def _answer(builder: ir.IRBuilder, found: ir.Value, status: ir.PhiInstr) -> None:
     """Report a status."""
     status.add_incoming(found, builder.block)
     builder.branch(status.parent)
 
 
-def _number(builder: Any, value: Any, kind: ir.Type, status: Any) -> Any:
+def _number(builder: ir.IRBuilder, value: ir.Value, kind: ir.Type, status: ir.PhiInstr) -> ir.Value:
     """Return a Python number as float; refuse other objects, and numbers too large to be rounded to float32."""
     x = api(builder, "PyFloat_AsDouble", value)
     with builder.if_then(builder.fcmp_ordered("==", x, ir.Constant(F64, -1.0)), likely=False):

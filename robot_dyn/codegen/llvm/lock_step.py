@@ -7,9 +7,9 @@ other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from llvmlite import ir
 
@@ -33,13 +33,13 @@ class Computed(NamedTuple):
         doubt: Mask of these runs; None if all results are stored.
     """
 
-    results: list[Any]
-    out_of_range: Any
+    results: list[ir.Value]
+    out_of_range: ir.Value
     seldom: range = range(0)
-    doubt: Any = None
+    doubt: ir.Value | None = None
 
 
-Body = Callable[[Writer, list[list[Any]]], Computed]  # (writer, the vectors of each input) → …
+Body = Callable[[Writer, list[list[ir.Value]]], Computed]  # (writer, the vectors of each input) → …
 
 
 def write_function(
@@ -56,7 +56,7 @@ def write_function(
             their order.
     """
 
-    def body(writer: Writer, inputs: list[list[Any]]) -> Computed:
+    def body(writer: Writer, inputs: list[list[ir.Value]]) -> Computed:
         written = writer.write(program, inputs)
         return Computed(written.results, written.out_of_range)
 
@@ -84,7 +84,7 @@ def write_step(
     n = second.inputs[-1]
     m = first.inputs[1]
 
-    def body(writer: Writer, inputs: list[list[Any]]) -> Computed:
+    def body(writer: Writer, inputs: list[list[ir.Value]]) -> Computed:
         t, y, p, run_parameters = inputs
         fixed = writer.write(first, [t, y[:m], p, run_parameters])
         solved = _repeated(writer, second, [t, fixed.results, [], y[m:]], passes)
@@ -132,7 +132,7 @@ def _write(
     builder.ret_void()
 
 
-def _repeated(writer: Writer, program: Program, inputs: list[list[Any]], passes: int) -> list[Any]:
+def _repeated(writer: Writer, program: Program, inputs: list[list[ir.Value]], passes: int) -> list[ir.Value]:
     """Return the results of a program for one vector of runs, repeated until they converge."""
     builder, vectors = writer.builder, writer.vectors
     before, again, done = builder.block, builder.append_basic_block(), builder.append_basic_block()
@@ -154,7 +154,7 @@ def _repeated(writer: Writer, program: Program, inputs: list[list[Any]], passes:
 
 def _any_angle(
     module: ir.Module, name: str, inputs: tuple[int, ...], body: Body, runs: int, run_parameters: Own
-) -> Any:
+) -> ir.Function:
     """Write the same function with the C library's sine, which stores results only for runs whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
@@ -175,18 +175,23 @@ def _any_angle(
 
 
 def _inputs(
-    vectors: Vectors, arguments: Any, inputs: tuple[int, ...], runs: int, at: Any, run_parameters: Own
-) -> list[list[Any]]:
+    vectors: Vectors,
+    arguments: Sequence[ir.Value],
+    inputs: tuple[int, ...],
+    runs: int,
+    at: ir.Value,
+    run_parameters: Own,
+) -> list[list[ir.Value]]:
     """Return the vectors of t, y, p and run_parameters, for the runs from `at` on."""
     t, y, p, numbers, _ = arguments
     _, m, shared, count = inputs
     builder = vectors.builder
 
-    def one(array: Any, k: int) -> Any:
+    def one(array: ir.Value, k: int) -> ir.Value:
         """Return a number shared by all runs."""
         return _spread(vectors, builder.load(builder.gep(array, [ir.Constant(I64, k)])))
 
-    def of_runs(array: Any, k: int) -> Any:
+    def of_runs(array: ir.Value, k: int) -> ir.Value:
         return builder.load(_place(vectors, array, k, runs, at), align=8)
 
     return [
@@ -197,13 +202,13 @@ def _inputs(
     ]
 
 
-def _place(vectors: Vectors, array: Any, k: int, runs: int, at: Any) -> Any:
+def _place(vectors: Vectors, array: ir.Value, k: int, runs: int, at: ir.Value) -> ir.Value:
     """Return the address of the numbers k of the runs from `at` on."""
     builder = vectors.builder
     place = builder.gep(array, [builder.add(at, ir.Constant(I64, k * runs))])
     return builder.bitcast(place, vectors.type.as_pointer())
 
 
-def _spread(vectors: Vectors, x: Any) -> Any:
+def _spread(vectors: Vectors, x: ir.Value) -> ir.Value:
     """Return a vector with a number in each lane."""
     return vectors.of([x] * vectors.count) if vectors.count > 1 else x

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from llvmlite import ir
 
@@ -14,19 +13,19 @@ WRITABLE, FORMAT, STRIDES, C_CONTIGUOUS = 0x1, 0x4, 0x18, 0x38  # requests to Py
 _FIELDS = "data", "owner", "size", "itemsize", "readonly", "axes", "format", "lengths", "strides"
 
 
-def empty_view(builder: ir.IRBuilder) -> Any:
+def empty_view(builder: ir.IRBuilder) -> ir.Value:
     """Return a pointer to a `Py_buffer` of no object, whose release does nothing."""
     view = builder.alloca(VIEW)
     builder.store(ir.Constant(OBJECT, None), _place(builder, view, "owner"))
     return view
 
 
-def field(builder: ir.IRBuilder, view: Any, name: str) -> Any:
+def field(builder: ir.IRBuilder, view: ir.Value, name: str) -> ir.Value:
     """Load a field of a view."""
     return builder.load(_place(builder, view, name))
 
 
-def is_array(builder: ir.IRBuilder, value: Any) -> Any:
+def is_array(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
     """Return whether the class of an object is `numpy.ndarray`, not a subclass."""
     kind = api(builder, "PyObject_Type", value)
     api(builder, "Py_DecRef", kind)  # the object still references it
@@ -34,13 +33,13 @@ def is_array(builder: ir.IRBuilder, value: Any) -> Any:
     return builder.icmp_unsigned("==", kind, ndarray)
 
 
-def acquired(builder: ir.IRBuilder, value: Any, view: Any, request: int) -> Any:
+def acquired(builder: ir.IRBuilder, value: ir.Value, view: ir.Value, request: int) -> ir.Value:
     """Fill a view; return whether that succeeded. If not, a Python error is set."""
     status = api(builder, "PyObject_GetBuffer", value, view, ir.Constant(I32, request))
     return builder.icmp_signed("==", status, ir.Constant(I32, 0))
 
 
-def has_form(builder: ir.IRBuilder, view: Any, kind: ir.Type, axes: int) -> Any:
+def has_form(builder: ir.IRBuilder, view: ir.Value, kind: ir.Type, axes: int) -> ir.Value:
     """Return whether a view contains aligned numbers of `kind` in native byte order, along `axes` axes."""
     conditions = [builder.icmp_signed("==", field(builder, view, "axes"), ir.Constant(I32, axes))]
     text = field(builder, view, "format")
@@ -52,7 +51,7 @@ def has_form(builder: ir.IRBuilder, view: Any, kind: ir.Type, axes: int) -> Any:
     return all_of(builder, [*conditions, builder.icmp_signed("==", below, ir.Constant(I64, 0))])
 
 
-def has_lengths(builder: ir.IRBuilder, view: Any, expected: Sequence[Any]) -> Any:
+def has_lengths(builder: ir.IRBuilder, view: ir.Value, expected: Sequence[ir.Value]) -> ir.Value:
     """Return whether a view of len(expected) axes has these lengths."""
     lengths, conditions = field(builder, view, "lengths"), []
     for axis, length in enumerate(expected):
@@ -61,7 +60,7 @@ def has_lengths(builder: ir.IRBuilder, view: Any, expected: Sequence[Any]) -> An
     return all_of(builder, conditions)
 
 
-def all_of(builder: ir.IRBuilder, conditions: Sequence[Any]) -> Any:
+def all_of(builder: ir.IRBuilder, conditions: Sequence[ir.Value]) -> ir.Value:
     """Return whether all conditions hold."""
     result = ir.Constant(I1, 1)
     for condition in conditions:
@@ -69,5 +68,5 @@ def all_of(builder: ir.IRBuilder, conditions: Sequence[Any]) -> Any:
     return result
 
 
-def _place(builder: ir.IRBuilder, view: Any, name: str) -> Any:
+def _place(builder: ir.IRBuilder, view: ir.Value, name: str) -> ir.Value:
     return builder.gep(view, [ir.Constant(I32, 0), ir.Constant(I32, _FIELDS.index(name))])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, final
+from typing import final
 
 from llvmlite import ir
 
@@ -41,7 +41,7 @@ class Limits:
 
 def state_function(
     module: ir.Module, name: str, program: Program, kind: ir.Type, limits: Limits, any_angle: bool, parameters: bool
-) -> Any:
+) -> ir.Function:
     """Write the function of one state; with `any_angle` it uses the C library's sine and cosine, for any angle."""
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, pointers), name)
@@ -65,29 +65,34 @@ def state_function(
     return function
 
 
-def numbers(builder: Any, array: Any, n: int) -> list[Any]:
+def numbers(builder: ir.IRBuilder, array: ir.Value, n: int) -> list[ir.Value]:
     """Load the n numbers at a pointer."""
     return [builder.load(builder.gep(array, [ir.Constant(I64, k)])) for k in range(n)]
 
 
-def distinct(program: Program, results: list[Any]) -> list[Any]:
+def distinct(program: Program, results: list[ir.Value]) -> list[ir.Value]:
     """Return each result once; half of the entries of M."""
     return list(dict(zip(program.outputs, results, strict=True)).values())
 
 
 def judged(
-    builder: Any, arguments: Any, results: Any, out_of_range: Any, most: float, doubtful: Any
-) -> tuple[Any, Any]:
+    builder: ir.IRBuilder,
+    arguments: ir.Value,
+    results: ir.Value,
+    out_of_range: ir.Value,
+    most: float,
+    doubtful: ir.Value,
+) -> tuple[ir.Value, ir.Value]:
     """Return the Status for the sums of absolute values and the angles, and the condition that it is FINE."""
     passed = builder.fcmp_ordered("<", arguments, ir.Constant(arguments.type, most))
     small = builder.fcmp_ordered("<", results, doubtful)
-    status = builder.select(small, *(ir.Constant(I64, int(x)) for x in (Status.FINE, Status.RESULT)))
+    status = builder.select(small, ir.Constant(I64, int(Status.FINE)), ir.Constant(I64, int(Status.RESULT)))
     status = builder.select(out_of_range, ir.Constant(I64, int(Status.FAR)), status)
     status = builder.select(passed, status, ir.Constant(I64, int(Status.ARGUMENT)))
     return status, builder.and_(builder.and_(passed, small), builder.not_(out_of_range))
 
 
-def _add_absolute(vectors: Vectors, array: Any, n: int, total: Any) -> Any:
+def _add_absolute(vectors: Vectors, array: ir.Value, n: int, total: ir.Value) -> ir.Value:
     """Add Σ |x| of n numbers, loaded again as vectors: one by one they would be 5 % of all instructions."""
     builder, at = vectors.builder, 0
     for count in (8, 4, 2, 1):

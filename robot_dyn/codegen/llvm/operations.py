@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+
+from llvmlite import ir
 
 from robot_dyn.codegen.llvm.elementary import tanh
 from robot_dyn.codegen.llvm.vectors import FLAGS, Lanes, Vectors
 from robot_dyn.codegen.program import Kind
 
-Operation = Callable[..., Any]  # (vectors, x) or (vectors, x, y) → the value
+Operation = Callable[..., ir.Value]  # (vectors, x) or (vectors, x, y) → the value
 
 
 def _arithmetic(instruction: str) -> Operation:
@@ -32,22 +33,22 @@ def _chosen(sign: str) -> Operation:
     return lambda vectors, x, y: vectors.builder.select(_ordered(vectors, sign, x, y), x, y)
 
 
-def _ordered(vectors: Vectors, sign: str, x: Any, y: Any) -> Any:
+def _ordered(vectors: Vectors, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
     """Return the mask of a comparison; false if an operand is NaN."""
     return vectors.builder.fcmp_ordered(sign, x, y)
 
 
-def _holds(vectors: Vectors, x: Any) -> Any:
+def _holds(vectors: Vectors, x: ir.Value) -> ir.Value:
     """Return the mask of a condition: true for any value other than 0, including NaN."""
     return vectors.builder.fcmp_unordered("!=", x, vectors.constant(0.0))
 
 
-def _truth(vectors: Vectors, mask: Any) -> Any:
+def _truth(vectors: Vectors, mask: ir.Value) -> ir.Value:
     """Convert a mask to 1.0 or 0.0."""
     return vectors.builder.select(mask, vectors.constant(1.0), vectors.constant(0.0))
 
 
-def _sign(vectors: Vectors, x: Any) -> Any:
+def _sign(vectors: Vectors, x: ir.Value) -> ir.Value:
     zero, select = vectors.constant(0.0), vectors.builder.select
     negative = select(_ordered(vectors, "<", x, zero), vectors.constant(-1.0), x)
     return select(_ordered(vectors, ">", x, zero), vectors.constant(1.0), negative)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -20,7 +19,7 @@ VIEW = ir.LiteralStructType(
 )
 NDARRAY = "numpy.ndarray"  # symbol of the class
 # Functions of Python's C API that the code calls: result and arguments
-_API: dict[str, tuple[Any, ...]] = {
+_API: dict[str, tuple[ir.Type, ...]] = {
     "PyBuffer_IsContiguous": (I32, VIEW.as_pointer(), ir.IntType(8)),
     "PyBuffer_Release": (ir.VoidType(), VIEW.as_pointer()),
     "PyBytes_AsString": (OBJECT, OBJECT),
@@ -66,12 +65,12 @@ def _method(address: int) -> _Method:
     return _Method(b"kernel", address, _FASTCALL, None)
 
 
-def function_of(module: ir.Module, name: str) -> Any:
+def function_of(module: ir.Module, name: str) -> ir.Function:
     """Declare a function of this form in a module: arguments (self, pointer to the arguments, their number)."""
     return ir.Function(module, ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), I64]), name)
 
 
-def api(builder: Any, name: str, *arguments: Any) -> Any:
+def api(builder: ir.IRBuilder, name: str, *arguments: ir.Value) -> ir.Value:
     """Call a function of Python's C API."""
     function = builder.module.globals.get(name)
     if function is None:

@@ -7,7 +7,7 @@ Moving the numbers of a state one by one would take a fifth of the time of forwa
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 from llvmlite import ir
 
@@ -18,7 +18,7 @@ _LINE = 64  # bytes of a cache line on most processors
 _AHEAD = 2  # groups of L states: a quarter of a microsecond, the latency of memory
 
 
-def loaded(vectors: Vectors, array: Any, at: Any, n: int) -> list[Any]:
+def loaded(vectors: Vectors, array: ir.Value, at: ir.Value, n: int) -> list[ir.Value]:
     """Return the n numbers of L states, rows of an array from `at` on, each as a vector."""
     columns = []
     for k in range(0, n, SIDE):
@@ -30,7 +30,7 @@ def loaded(vectors: Vectors, array: Any, at: Any, n: int) -> list[Any]:
     return columns
 
 
-def store(vectors: Vectors, array: Any, at: Any, results: list[Any]) -> None:
+def store(vectors: Vectors, array: ir.Value, at: ir.Value, results: list[ir.Value]) -> None:
     """Write vectors as the numbers of L states, rows of an array from `at` on."""
     n = len(results)
     for k in range(0, n, SIDE):
@@ -42,7 +42,7 @@ def store(vectors: Vectors, array: Any, at: Any, results: list[Any]) -> None:
                 _masked(vectors, "store", ir.VoidType(), row, *place)
 
 
-def prefetch(vectors: Vectors, array: Any, at: Any, n: int, written: bool) -> None:
+def prefetch(vectors: Vectors, array: ir.Value, at: ir.Value, n: int, written: bool) -> None:
     """Prefetch the cache lines of the states that are computed AHEAD groups later; past the end this is harmless."""
     builder = vectors.builder
     start = builder.bitcast(builder.gep(array, [builder.mul(at, ir.Constant(I64, n))]), ir.IntType(8).as_pointer())
@@ -54,7 +54,7 @@ def prefetch(vectors: Vectors, array: Any, at: Any, n: int, written: bool) -> No
         builder.call(function, [builder.gep(start, [ir.Constant(I64, _AHEAD * length + offset)]), *flags])
 
 
-def transposed(builder: Any, rows: list[Any]) -> list[Any]:
+def transposed(builder: ir.IRBuilder, rows: list[ir.Value]) -> list[ir.Value]:
     """Transpose eight vectors of eight by exchanging blocks of 1, 2 and 4."""
     for size in (1, 2, 4):
         new = list(rows)
@@ -68,19 +68,21 @@ def transposed(builder: Any, rows: list[Any]) -> list[Any]:
     return rows
 
 
-def _read(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width: int) -> Any:
+def _read(vectors: Vectors, array: ir.Value, at: ir.Value, i: int, n: int, k: int, width: int) -> ir.Value:
     vector = wide(vectors.kind, SIDE)
     place = _place(vectors, array, at, i, n, k, width)
     return _masked(vectors, "load", vector, *place, ir.Constant(vector, ir.Undefined))
 
 
-def _masked(vectors: Vectors, operation: str, result: Any, *arguments: Any) -> Any:
+def _masked(vectors: Vectors, operation: str, result: ir.Type, *arguments: ir.Value) -> ir.Value:
     shape = ir.FunctionType(result, [x.type for x in arguments])
     name = f"llvm.masked.{operation}.v{SIDE}f{8 * vectors.size}.p0"
     return vectors.builder.call(vectors.builder.module.declare_intrinsic(name, fnty=shape), arguments)
 
 
-def _place(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width: int) -> tuple[Any, Any, Any]:
+def _place(
+    vectors: Vectors, array: ir.Value, at: ir.Value, i: int, n: int, k: int, width: int
+) -> tuple[ir.Value, ir.Value, ir.Value]:
     """Return the address of numbers k … of row at + i of an array (B, n), the alignment, and the mask of the width."""
     builder = vectors.builder
     offset = builder.add(builder.mul(at, ir.Constant(I64, n)), ir.Constant(I64, i * n + k))
@@ -89,17 +91,17 @@ def _place(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width:
     return pointer, ir.Constant(I32, vectors.size), mask
 
 
-def _part(vectors: Vectors, vector: Any, first: int) -> Any:
+def _part(vectors: Vectors, vector: ir.Value, first: int) -> ir.Value:
     """Return eight numbers of a vector."""
     if vectors.count == SIDE:
         return vector
     return vectors.builder.shuffle_vector(vector, vector, _order(range(first, first + SIDE)))
 
 
-def _joined(vectors: Vectors, low: Any, high: Any) -> Any:
+def _joined(vectors: Vectors, low: ir.Value, high: ir.Value) -> ir.Value:
     return vectors.builder.shuffle_vector(low, high, _order(range(2 * SIDE)))
 
 
-def _order(places: Any) -> Any:
+def _order(places: Sequence[int]) -> ir.Value:
     """Return the mask of a shuffle."""
     return ir.Constant(ir.VectorType(I32, len(places)), list(places))

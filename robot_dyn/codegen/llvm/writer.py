@@ -8,13 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 from robot_dyn.codegen.llvm.elementary import RANGE, sincos
 from robot_dyn.codegen.llvm.operations import OPERATIONS
 from robot_dyn.codegen.llvm.sine_groups import GROUP, in_groups
 from robot_dyn.codegen.llvm.vectors import Lanes, Vectors
 from robot_dyn.codegen.program import Kind, Op, Program
+
+if TYPE_CHECKING:
+    from llvmlite import ir
 
 
 @final
@@ -27,8 +30,8 @@ class Written:
         out_of_range: Mask of states with an angle beyond RANGE.
     """
 
-    results: list[Any]
-    out_of_range: Any
+    results: list[ir.Value]
+    out_of_range: ir.Value
 
 
 @final
@@ -43,8 +46,8 @@ class Writer:
         any_angle: Use the C library's sine and cosine.
     """
 
-    builder: Any
-    kind: Any
+    builder: ir.IRBuilder
+    kind: ir.Type
     count: int = 1
     any_angle: bool = False
 
@@ -53,7 +56,7 @@ class Writer:
         """Vectors of the states."""
         return Vectors(self.builder, self.kind, self.count)
 
-    def write(self, program: Program, inputs: Sequence[Sequence[Any]]) -> Written:
+    def write(self, program: Program, inputs: Sequence[Sequence[ir.Value]]) -> Written:
         """Write the instructions of a program for vectors of each input."""
         vectors = self.vectors
         values = dict(enumerate(chain(*inputs, map(vectors.constant, program.constants))))
@@ -71,7 +74,7 @@ class Writer:
                 out_of_range = self.builder.or_(out_of_range, self._sines(ops, values))
         return Written([values[i] for i in program.outputs], out_of_range)
 
-    def _sines(self, ops: tuple[Op, ...], values: dict[int, Any]) -> Any:
+    def _sines(self, ops: tuple[Op, ...], values: dict[int, ir.Value]) -> ir.Value:
         """Write sines and cosines, several angles of one state in one vector; return the mask of far angles."""
         together = Vectors(self.builder, self.kind, self.count if len(ops) == 1 else GROUP)
         angles = [values[op.operands[0]] for op in ops]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from llvmlite import ir
 
@@ -57,7 +58,7 @@ def store(f: Function, x: ArrayValue, indices: list[Scalar], value: Scalar) -> N
     f.builder.store(stored, address(f, x, indices))
 
 
-def address(f: Function, x: ArrayValue, indices: list[Scalar]) -> Any:
+def address(f: Function, x: ArrayValue, indices: list[Scalar]) -> ir.Value:
     """Return the address of an entry, or of the first entry of a view, from its leading indices."""
     at, b = number(0), f.builder
     for index, stride in zip(indices, x.strides(b), strict=False):
@@ -108,7 +109,7 @@ def index_within(f: Function, index: Scalar, length: Scalar, node: ast.AST) -> S
     """Return an index that is checked against the length of an axis; a negative one counts from the end."""
     index, b = converted(f, index, INT, node), f.builder
     if index.const is not None and length.const is not None and -length.const <= index.const < length.const:
-        return number(index.const % length.const)
+        return number(int(index.const % length.const))
     if index.const is not None and index.const < 0:
         index = Scalar(INT, b.add(index.ir, length.ir))
     elif f.checks and index.const is None:
@@ -188,7 +189,7 @@ def size(f: Function, x: ArrayValue) -> Scalar:
     return _product(f, x.shape)
 
 
-def _product(f: Function, lengths: Any) -> Scalar:
+def _product(f: Function, lengths: Iterable[Scalar]) -> Scalar:
     product = ONE
     for length in lengths:
         product = times(product, length, f.builder)

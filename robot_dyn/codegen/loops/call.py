@@ -8,15 +8,15 @@ from __future__ import annotations
 import ctypes
 import threading
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from time import perf_counter
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.machine_code import Passes
-from robot_dyn.codegen.loops.dependencies import dependencies
-from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
+from robot_dyn.codegen.loops.dependencies import Instead, dependencies
+from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, Unpacked, unpacked, words
 from robot_dyn.codegen.loops.packing import Packed, pack
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
@@ -24,7 +24,11 @@ from robot_dyn.codegen.waiting import COMPILING, interrupts_later
 from robot_dyn.foundations.errors import MachineCodeError
 from robot_dyn.foundations.waiting import log_if_slow
 
+if TYPE_CHECKING:
+    from llvmlite import ir
+
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
+Entry = Callable[[int, int], bytes | None]  # (addresses of the arguments, address of the result) → a failure
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
 _NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
 QUICK = Passes(level=1, effort=1)  # most work is in called functions
@@ -43,18 +47,18 @@ class MachineFunction:
     """
 
     def __init__(
-        self, function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]],
+        self, function: Callable[..., object], instead: Instead,
         store: Callable[[], Store | None], about: str, passes: Passes = QUICK,
     ) -> None:  # fmt: skip
         self.function, self.about, self._passes = function, about, passes
         self.store, self._instead, self._lock = store, instead, threading.Lock()
-        self._entries: dict[Any, tuple[Any, Kind]] = {}
+        self._entries: dict[Hashable, tuple[Entry, Kind]] = {}
 
     def calls(self) -> Call:
         """Return a caller, for one thread at a time."""
         return Call(self)
 
-    def check(self, *arguments: Any) -> None:
+    def check(self, *arguments: object) -> None:
         """Translate the function for such arguments, without compiling it.
 
         Raises:
@@ -81,7 +85,7 @@ class MachineFunction:
         """Key of the note that its machine code is stored; compilation uses the code and values of that moment."""
         return self.key(())
 
-    def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
+    def entry(self, place: Hashable, kinds: Sequence[Kind]) -> tuple[Entry, Kind]:
         """Return the function that takes words, and the type of its result.
 
         Args:
@@ -102,8 +106,8 @@ class MachineFunction:
         COMPILING.seconds += perf_counter() - began
         return self._entries[place]
 
-    def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
-        def write(module: Any, prefix: str) -> None:
+    def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Entry, Kind]:
+        def write(module: ir.Module, prefix: str) -> None:
             from llvmlite import ir
 
             from robot_dyn.codegen.loops.kinds import TEXT
@@ -133,13 +137,13 @@ class Call:
 
     def __init__(self, function: MachineFunction) -> None:
         self._function = function
-        self._given: list[Any] = []
+        self._given: list[object] = []
         self._kinds: list[Kind] = []
         self._packed: dict[tuple[int, ...], Packed] = {}  # by the indices of their arguments
-        self._entry: Any = None
+        self._entry: Entry = _ENTRY()
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Return the result for these arguments."""
+    def __call__(self, *arguments: object) -> Any:
+        """Return the result of the function for these arguments."""
         before = self._given
         if len(before) != len(arguments):
             self._given, self._packed, self._kinds = [None] * len(arguments), {}, [Static.of(None)] * len(arguments)
@@ -154,7 +158,7 @@ class Call:
             raise MachineCodeError(text.decode())
         return self._result()
 
-    def _take(self, others: tuple[int, ...], arguments: tuple[Any, ...]) -> None:
+    def _take(self, others: tuple[int, ...], arguments: tuple[object, ...]) -> None:
         """Pack the arguments that differ from those of the previous call."""
         packed, same = pack(tuple([arguments[i] for i in others]), self._function.store), True
         self._packed[others] = packed
@@ -167,7 +171,7 @@ class Call:
             self._out = array("q", bytes(8 * max(1, words(self._kind))))
             self._addresses, self._out_address = self._block.buffer_info()[0], self._out.buffer_info()[0]
 
-    def _result(self) -> Any:
+    def _result(self) -> Unpacked:
         return unpacked(self._out.tolist(), self._kind)
 
 

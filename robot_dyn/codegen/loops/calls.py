@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import FunctionType, MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from llvmlite import ir
@@ -15,6 +15,7 @@ from llvmlite import ir
 from robot_dyn.codegen.loops import arrays, numbers
 from robot_dyn.codegen.loops.kinds import F64, FLOAT, I64, INT, TEXT, UINT
 from robot_dyn.codegen.loops.values import (
+    UNWRITTEN,
     ArrayValue,
     Scalar,
     StaticValue,
@@ -59,17 +60,17 @@ def called(f: Function, node: ast.Call) -> Value:
     raise f.refused(node, f"the call {ast.unparse(node)}", f"call {callables}, or a primitive")
 
 
-def _translated(f: Function, node: ast.Call, function: Any, arguments: list[Value]) -> Value:
+def _translated(f: Function, node: ast.Call, function: FunctionType, arguments: list[Value]) -> Value:
     """Return the result of another function, which is translated for these types."""
     written = f.program.written(function, tuple(argument.kind for argument in arguments), partial(f.refuse, node))
     f.may_fail |= written.may_fail
     parts = leaf_types(written.result)
     if f.silent:
-        return of_leaves(written.result, [None] * len(parts))
+        return of_leaves(written.result, [UNWRITTEN] * len(parts))
     b = f.builder
     returned = b.call(written.ir, [leaf for argument in arguments for leaf in leaves(argument)])
     count = written.may_fail + len(parts)
-    results = [returned] if count == 1 else [b.extract_value(returned, i) for i in range(count)]
+    results: list[ir.Value] = [returned] if count == 1 else [b.extract_value(returned, i) for i in range(count)]
     if written.may_fail:
         f.fail_unless(b.icmp_unsigned("==", results[0], ir.Constant(TEXT, None)), results[0])
     return of_leaves(written.result, results[written.may_fail :])
@@ -176,7 +177,7 @@ def _frexp(f: Function, node: ast.AST, x: Value) -> Value:
     """Return m and e of x = m 2ᵉ."""
     x, b = numbers.real(f, x, node), f.builder
     if f.silent:
-        return TupleValue((Scalar(FLOAT, None), Scalar(INT, None)))
+        return TupleValue((Scalar(FLOAT, UNWRITTEN), Scalar(INT, UNWRITTEN)))
     i32 = ir.IntType(32)
     with b.goto_entry_block():
         slot = b.alloca(i32)
@@ -184,7 +185,7 @@ def _frexp(f: Function, node: ast.AST, x: Value) -> Value:
     return TupleValue((Scalar(FLOAT, m), Scalar(INT, b.sext(b.load(slot), I64))))
 
 
-_HANDLERS: Mapping[Any, Handler] = MappingProxyType(
+_HANDLERS: Mapping[Callable[..., object], Handler] = MappingProxyType(
     {
         abs: _abs, min: _extreme("<"), max: _extreme(">"), len: _len, float: _float, int: _int, np.uint64: _word,
         np.sqrt: _sqrt, np.sign: _sign, np.spacing: _spacing, np.nextafter: _nextafter, math.frexp: _frexp,

@@ -10,19 +10,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from enum import EnumMeta
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robot_dyn.codegen.loops.source import names_of
 from robot_dyn.codegen.store.definition import code_parts
 
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.values import Value
 
-def reached(function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]]) -> list[FunctionType]:
+Instead = Mapping[Callable[..., object], "FunctionType | Callable[..., Value]"]  # substitutes for functions
+
+
+def reached(function: Callable[..., object], instead: Instead) -> list[FunctionType]:
     """Return a function and all functions it calls by the names in it, or their substitutes."""
     functions: dict[FunctionType, None] = {}
 
-    def visit(candidate: Any) -> None:
+    def visit(candidate: Callable[..., object]) -> None:
         candidate = instead.get(candidate, candidate)
         if isinstance(candidate, FunctionType) and candidate not in functions and not hasattr(candidate, "emits"):
             functions[candidate] = None
@@ -34,7 +39,7 @@ def reached(function: Callable[..., Any], instead: Mapping[Any, Callable[..., An
     return list(functions)
 
 
-def dependencies(function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]]) -> list[str]:
+def dependencies(function: Callable[..., object], instead: Instead) -> list[str]:
     """Return texts that determine the behaviour of a function, for arguments of given types."""
     texts = []
     for dependency in reached(function, instead):
@@ -45,13 +50,13 @@ def dependencies(function: Callable[..., Any], instead: Mapping[Any, Callable[..
     return texts
 
 
-def _named(function: FunctionType) -> dict[str, Any]:
+def _named(function: FunctionType) -> dict[str, object]:
     """Return the values of names that a function takes from elsewhere."""
     values, code = names_of(function), function.__code__
     return {name: values[name] for name in (*code.co_names, *code.co_freevars) if name in values}
 
 
-def _described(value: Any, instead: Mapping[Any, Callable[..., Any]]) -> str:
+def _described(value: object, instead: Instead) -> str:
     value = instead.get(value, value) if callable(value) else value
     if isinstance(value, FunctionType | ModuleType):
         return f"{value.__name__} of {getattr(value, '__module__', '')}"

@@ -12,6 +12,7 @@ from llvmlite import ir
 from robot_dyn.codegen.loops import arrays, calls, numbers
 from robot_dyn.codegen.loops.kinds import BOOL, I64, RecordKind, Static, TupleKind
 from robot_dyn.codegen.loops.values import (
+    UNWRITTEN,
     ArrayValue,
     RecordValue,
     Scalar,
@@ -69,7 +70,7 @@ def field(f: Function, record: RecordValue, name: str) -> Value:
     if isinstance(kind, TupleKind):
         raise f.refused(f.tree, f"the tuple {name!r} in a named tuple", "use a named tuple")
     if f.silent or isinstance(kind, Static):
-        return of_leaves(kind, [None] * len(leaf_types(kind)))
+        return of_leaves(kind, [UNWRITTEN] * len(leaf_types(kind)))
     return f.program.read(f.builder, record.pointer, kind, first)
 
 
@@ -90,7 +91,7 @@ def _item(f: Function, values: TupleValue, index: Scalar, node: ast.AST) -> Valu
     if index.const is not None:
         if not -count <= index.const < count:
             raise f.refused(node, f"the item {index.const} of {count}", "use an existing item")
-        return values.items[index.const]
+        return values.items[int(index.const)]
     if len({item.kind for item in values.items}) != 1 or not isinstance(values.items[0], Scalar):
         raise f.refused(node, "an item of a tuple by a variable index", "use a tuple of numbers of one type")
     index = arrays.index_within(f, index, number(count), node)
@@ -119,7 +120,7 @@ def _unary(f: Function, node: ast.UnaryOp) -> Value:
 def _logic(f: Function, node: ast.BoolOp) -> Value:
     """Return the value of `and` or `or`; later operands are computed only if they matter."""
 
-    def item(operand: ast.expr) -> Any:
+    def item(operand: ast.expr) -> ir.Value:
         x = numbers.scalar(f, value(f, operand), operand)
         if x.kind != BOOL:
             raise f.refused(operand, "and, or of values that are not truth values", "compare them, as in x != 0")
@@ -128,7 +129,7 @@ def _logic(f: Function, node: ast.BoolOp) -> Value:
     return Scalar(BOOL, _shortened(f, node.values, isinstance(node.op, ast.And), item))
 
 
-def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[ast.expr], Any]) -> Any:
+def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[ast.expr], ir.Value]) -> ir.Value:
     """Return whether all or any of the operands hold, computed in sequence until the result is decided."""
     b, b0 = f.builder, ir.Constant(BOOL.llvm, int(not all_))
     done = b.append_basic_block()
@@ -144,31 +145,36 @@ def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[a
     return _merged(f, BOOL.llvm, ends)
 
 
-def _merged(f: Function, kind: ir.Type, ends: list[tuple[Any, Any]]) -> Any:
+def _merged(f: Function, kind: ir.Type, ends: list[tuple[ir.Value, ir.Block]]) -> ir.Value:
     if f.silent:
-        return None
+        return UNWRITTEN
     phi = f.builder.phi(kind)
     for value_, block in ends:
         phi.add_incoming(value_, block)
     return phi
 
 
-def test(f: Function, node: ast.expr) -> Any:
+def test(f: Function, node: ast.expr) -> ir.Value:
     """Return whether an expression holds, as LLVM's I1: numbers hold unless they are 0."""
     if isinstance(node, ast.BoolOp):
         return _shortened(f, node.values, isinstance(node.op, ast.And), lambda operand: test(f, operand))
     return numbers.truth(f, numbers.scalar(f, value(f, node), node))
 
 
+def _number(f: Function, operand: ast.expr, node: ast.AST) -> Scalar:
+    """Return the value of an operand that is a number."""
+    return numbers.scalar(f, value(f, operand), node)
+
+
 def _comparison(f: Function, node: ast.Compare) -> Value:
     """Return the value of a chain of relations, each computed only if those before it hold."""
     left, ends, b = numbers.scalar(f, value(f, node.left), node), [], f.builder
-    done = b.append_basic_block() if len(node.ops) > 1 else None
+    if len(node.ops) == 1:
+        return numbers.compared(f, type(node.ops[0]), left, _number(f, node.comparators[0], node), node)
+    done = b.append_basic_block()
     for i, (op, operand) in enumerate(zip(node.ops, node.comparators, strict=True)):
-        right = numbers.scalar(f, value(f, operand), node)
+        right = _number(f, operand, node)
         holds = numbers.compared(f, type(op), left, right, node)
-        if done is None and len(node.ops) == 1:
-            return holds
         last = i == len(node.ops) - 1
         more = done if last else b.append_basic_block()
         ends.append((holds.ir if last else ir.Constant(BOOL.llvm, 0), b.block))
@@ -190,7 +196,7 @@ def _conditional(f: Function, node: ast.IfExp) -> Value:
     return _either(f, node, values, ends, done)
 
 
-def _either(f: Function, node: ast.AST, values: list[Value], ends: list[Any], done: Any) -> Value:
+def _either(f: Function, node: ast.AST, values: list[Value], ends: list[ir.Block], done: ir.Block) -> Value:
     """Return one of two values, depending on the preceding block."""
     kind, b = f.common(values[0].kind, values[1].kind, node), f.builder
     parts = []
@@ -200,7 +206,7 @@ def _either(f: Function, node: ast.AST, values: list[Value], ends: list[Any], do
         b.branch(done)
     b.position_at_end(done)
     if f.silent:
-        return of_leaves(kind, [None] * len(leaf_types(kind)))
+        return of_leaves(kind, [UNWRITTEN] * len(leaf_types(kind)))
     columns = zip(*parts, strict=True)
     kinds = leaf_types(kind)
     merged = [_merged(f, t, list(zip(x, ends, strict=True))) for t, x in zip(kinds, columns, strict=True)]

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NoReturn, final
+from types import FunctionType
+from typing import TYPE_CHECKING, NoReturn, final
 
 from llvmlite import ir
 
@@ -21,6 +22,9 @@ from robot_dyn.codegen.loops.kinds import F64, TEXT, ArrayKind, Kind, Number, St
 from robot_dyn.codegen.loops.numbers import converted, joined
 from robot_dyn.codegen.loops.source import SubsetError, names_of, refused, stores, syntax
 from robot_dyn.codegen.loops.values import (
+    SILENT,
+    UNWRITTEN,
+    Builder,
     Scalar,
     StaticValue,
     TupleValue,
@@ -36,19 +40,6 @@ if TYPE_CHECKING:
     from robot_dyn.codegen.loops.program import Program
 
 _PASSES = 8
-
-
-class _Silent:
-    """Substitute for LLVM's builder that writes nothing, while types are inferred."""
-
-    block = None
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return _nothing
-
-
-def _nothing(*_: Any, **__: Any) -> None:
-    return None
 
 
 @final
@@ -70,27 +61,27 @@ class Function:
             assigned at breaks.
     """
 
-    def __init__(self, program: Program, function: Callable[..., Any], kinds: Sequence[Kind], checks: bool) -> None:
+    def __init__(self, program: Program, function: FunctionType, kinds: Sequence[Kind], checks: bool) -> None:
         self.program, self.function, self.checks = program, function, checks
         self.tree = syntax(function)
-        self.builder: Any = _Silent()
+        self.builder: Builder = SILENT
         self.arguments = dict(zip(self._parameters(len(kinds)), kinds, strict=True))
         self.globals = names_of(function)
         self._times = Counter(self.arguments.keys()) + stores(self.tree)
         self._kinds: dict[str, Kind] = dict(self.arguments)
         self._values: dict[str, Value] = {}  # of names assigned at one place
-        self._slots: dict[str, list[Any]] = {}  # of other names
+        self._slots: dict[str, list[ir.Value]] = {}  # of other names
         self.assigned: set[str] = set()
         self.result: Kind | None = None
         self.may_fail = False
-        self.leaving: list[Any] = []
-        self._failure: Any = None
+        self.leaving: list[tuple[ir.Block, ir.Block, list[set[str]]]] = []
+        self._failure: tuple[ir.Block, ir.PhiInstr] | None = None
         self._settled = True
 
     @property
     def silent(self) -> bool:
         """True while types are inferred and nothing is written."""
-        return isinstance(self.builder, _Silent)
+        return self.builder is SILENT
 
     def _parameters(self, count: int) -> list[str]:
         parameters = self.tree.args
@@ -113,12 +104,12 @@ class Function:
         """Write the function into the module of its program."""
         for _ in range(_PASSES):
             self._settled = True
-            self._body([None] * sum(len(leaf_types(kind)) for kind in self.arguments.values()))
+            self._body([UNWRITTEN] * sum(len(leaf_types(kind)) for kind in self.arguments.values()))
             if self._settled:
                 break
         else:
             raise self.refused(self.tree, "a function whose types do not settle", "give each name one type")
-        result: Any = Static.of(None) if self.result is None else self.result
+        result = _or_none(self.result)
         argument_types = [leaf for kind in self.arguments.values() for leaf in leaf_types(kind)]
         function = ir.Function(
             self.program.module, ir.FunctionType(_llvm_result(result, self.may_fail), argument_types),
@@ -132,7 +123,7 @@ class Function:
         self._body(list(function.args))
         return Written(function, result, self.may_fail)
 
-    def _body(self, values: list[Any]) -> None:
+    def _body(self, values: list[ir.Value]) -> None:
         self.assigned, self.leaving, self._failure = set(self.arguments), [], None
         if not self.silent:
             self._slots = {
@@ -147,6 +138,10 @@ class Function:
             if self.result not in (None, Static.of(None)):
                 raise self.refused(self.tree, "a function that ends without its result", "end it with a return")
             self.give(StaticValue(None), self.tree)
+        self._end_failure()
+
+    def _end_failure(self) -> None:
+        """Write the end of the block that failures branch to."""
         if self._failure is not None and not self.silent:
             block, text = self._failure
             self.builder.position_at_end(block)
@@ -214,14 +209,16 @@ class Function:
         if self._times[node.id] == 1:
             return self._values[node.id]
         kind = self._kinds[node.id]
-        parts = [None] * len(leaf_types(kind)) if self.silent else [self.builder.load(x) for x in self._slots[node.id]]
+        parts = (
+            [UNWRITTEN] * len(leaf_types(kind)) if self.silent else [self.builder.load(x) for x in self._slots[node.id]]
+        )
         return of_leaves(kind, parts)
 
     def refuse(self, node: ast.AST, construct: str, remedy: str) -> NoReturn:
         """Raise the error of a construct."""
         raise self.refused(node, construct, remedy)
 
-    def constant(self, value: Any, node: ast.AST) -> Value:
+    def constant(self, value: object, node: ast.AST) -> Value:
         """Return a value that is fixed when the function is translated."""
         return self.program.constant(value, partial(self.refuse, node))
 
@@ -239,7 +236,7 @@ class Function:
         if not self.silent:
             self._leave(ir.Constant(TEXT, None), leaves(self.fitted(value, self.result, node)))
 
-    def _leave(self, text: Any, parts: list[Any]) -> None:
+    def _leave(self, text: ir.Value, parts: list[ir.Value]) -> None:
         parts = [text, *parts] if self.may_fail else parts
         if len(parts) < 2:
             self.builder.ret(parts[0]) if parts else self.builder.ret_void()
@@ -249,14 +246,14 @@ class Function:
             returned = self.builder.insert_value(returned, part, i)
         self.builder.ret(returned)
 
-    def check(self, holds: Any, node: ast.AST, message: str) -> None:
+    def check(self, holds: ir.Value, node: ast.AST, message: str) -> None:
         """Fail unless a condition holds."""
         self.may_fail = True
         if not self.silent:
             where = f"{self.function.__module__}.{self.function.__qualname__}, line {getattr(node, 'lineno', 0)}"
             self.fail_unless(holds, self.program.text(f"{where}: {message}"))
 
-    def fail_unless(self, holds: Any, text: Any) -> None:
+    def fail_unless(self, holds: ir.Value, text: ir.Value) -> None:
         """Fail with a text unless a condition holds."""
         self.may_fail = True
         if self.silent:
@@ -271,14 +268,14 @@ class Function:
         self.builder.cbranch(holds, success, block)
         self.builder.position_at_end(success)
 
-    def external(self, name: str, result: Any, *arguments: Any) -> Any:
+    def external(self, name: str, result: ir.Type, *arguments: ir.Type) -> ir.Value:
         """Return a function of the C library that LLVM's optimiser does not recognise."""
-        return None if self.silent else self.program.external(name, result, *arguments)
+        return UNWRITTEN if self.silent else self.program.external(name, result, *arguments)
 
-    def intrinsic(self, name: str, *arguments: Any) -> Any:
+    def intrinsic(self, name: str, *arguments: ir.Value) -> ir.Value:
         """Call an LLVM intrinsic."""
         if self.silent:
-            return None
+            return UNWRITTEN
         shape = ir.FunctionType(F64, [F64] * len(arguments))
         return self.builder.call(self.program.module.declare_intrinsic(f"llvm.{name}", [F64], shape), list(arguments))
 
@@ -289,7 +286,7 @@ class Function:
             yield index
 
 
-def _llvm_result(kind: Kind, may_fail: bool) -> Any:
+def _llvm_result(kind: Kind, may_fail: bool) -> ir.Type:
     parts = [TEXT] * may_fail + leaf_types(kind)
     return ir.LiteralStructType(parts) if len(parts) > 1 else parts[0] if parts else ir.VoidType()
 

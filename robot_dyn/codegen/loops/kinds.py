@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import NamedTuple, TypeGuard, final
 
 import numpy as np
 from llvmlite import ir
@@ -34,7 +34,7 @@ class Number:
 
 
 FLOAT, INT, UINT, BOOL = Number("float"), Number("int"), Number("uint"), Number("bool")
-_CLASSES: tuple[tuple[Number, Any], ...] = (
+_CLASSES: tuple[tuple[Number, type | tuple[type, ...]], ...] = (
     (BOOL, (bool, np.bool_)), (UINT, np.uint64), (INT, (int, np.integer)), (FLOAT, float),
 )  # fmt: skip
 _OF_DTYPE = {np.dtype(of): number for of, number in ((float, FLOAT), (np.int64, INT), (np.uint64, UINT), (bool, BOOL))}
@@ -107,16 +107,17 @@ class Static:
         token: Text that distinguishes values; 1, 1.0 and True differ.
     """
 
-    value: Any = field(compare=False)
+    value: object = field(compare=False)
     token: str
 
     @staticmethod
-    def of(value: Any) -> Static:
+    def of(value: object) -> Static:
         """Return the type of a value."""
         return Static(value, f"{id(value)}" if callable(value) else repr(value))
 
 
 Kind = Number | ArrayKind | RecordKind | TupleKind | Static
+Unpacked = float | np.uint64 | None | tuple["Unpacked", ...]  # what machine code returns to Python
 
 
 def words(kind: Kind) -> int:
@@ -128,12 +129,12 @@ def words(kind: Kind) -> int:
     return 0 if isinstance(kind, Static) else kind.words
 
 
-def is_record(value: Any) -> bool:
+def is_record(value: object) -> TypeGuard[NamedTuple]:
     """Return True for a named tuple."""
     return isinstance(value, tuple) and hasattr(value, "_fields")
 
 
-def kind_of(value: Any) -> Kind:
+def kind_of(value: object) -> Kind:
     """Return the type of an argument.
 
     Raises:
@@ -165,7 +166,7 @@ def _kind_of_array(x: np.ndarray) -> ArrayKind:
     return ArrayKind(_OF_DTYPE[x.dtype], x.ndim, x.flags.c_contiguous, single, frozen)
 
 
-def unpacked(values: list[int], kind: Kind) -> Any:
+def unpacked(values: list[int], kind: Kind) -> Unpacked:
     """Return the value of words of a number, or of a tuple of numbers."""
     if isinstance(kind, TupleKind):
         ends = np.cumsum([0, *map(words, kind.items)])

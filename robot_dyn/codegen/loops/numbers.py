@@ -10,7 +10,7 @@ import ast
 import operator
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from llvmlite import ir
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _LEAST = -(2**63)
 Names = Mapping[type[ast.operator], str]
-_IN_PYTHON: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = MappingProxyType(
+_IN_PYTHON: Mapping[type[ast.operator], Callable[[float, float], object]] = MappingProxyType(
     {
         ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
         ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
@@ -60,7 +60,7 @@ def converted(f: Function, x: Scalar, kind: Kind, node: ast.AST) -> Scalar:
     if kind == INT and x.kind == BOOL:
         return number(int(x.const)) if x.const is not None else Scalar(INT, f.builder.zext(x.ir, I64))
     if kind == UINT and x.kind == INT and x.const is not None and 0 <= x.const < 2**64:
-        return word(x.const)
+        return word(int(x.const))
     remedy = "convert it with int, float or np.uint64"
     raise f.refused(
         node, f"a number of type {x.kind.name} where {getattr(kind, 'name', 'another')} is required", remedy
@@ -84,7 +84,7 @@ def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, 
 def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     """Return the result of an operation on two numbers."""
     if x.const is not None and y.const is not None and UINT not in (x.kind, y.kind):
-        return _of_constants(f, of, x, y, node)
+        return _of_constants(f, of, x.const, y.const, node)
     if of in _BITS and x.kind == y.kind and x.kind != FLOAT:
         return Scalar(x.kind, getattr(f.builder, _BITS[of])(x.ir, y.ir))
     if x.kind == y.kind == BOOL:
@@ -103,9 +103,9 @@ def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.
     raise f.refused(node, f"{of.__name__} of numbers of type {x.kind.name}", "convert them, or write it differently")
 
 
-def _of_constants(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+def _of_constants(f: Function, of: type[ast.operator], x: float, y: float, node: ast.AST) -> Scalar:
     try:
-        value = _IN_PYTHON[of](x.const, y.const)
+        value = _IN_PYTHON[of](x, y)
     except (ArithmeticError, TypeError, KeyError, ValueError) as error:
         raise f.refused(node, f"an operation on constants ({error})", "correct it") from None
     if not isinstance(value, bool | float) and not (isinstance(value, int) and _LEAST <= value < -_LEAST):
@@ -171,7 +171,7 @@ def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.A
     return Scalar(BOOL, (b.icmp_signed if x.kind == INT else b.icmp_unsigned)(sign, x.ir, y.ir))
 
 
-def truth(f: Function, x: Scalar) -> Any:
+def truth(f: Function, x: Scalar) -> ir.Value:
     """Return whether a number is not 0, as LLVM's I1."""
     if x.kind == BOOL:
         return x.ir

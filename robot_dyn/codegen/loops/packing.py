@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from itertools import count
-from typing import Any, final
+from typing import Any, SupportsInt, final
 
 import numpy as np
 from llvmlite import ir
@@ -55,7 +55,7 @@ class _Layout:
         kinds: Number that identifies the types, and the types, by array forms.
     """
 
-    def __init__(self, values: tuple[Any, ...]) -> None:
+    def __init__(self, values: tuple[object, ...]) -> None:
         self.starts: list[int] = []
         self.size, self.firsts, self.numbers = 0, array("q"), list[int]()
         self.kinds: dict[bytes, tuple[int, tuple[Kind, ...]]] = {}
@@ -63,7 +63,7 @@ class _Layout:
             self.starts.append(self.size)
             self._add(value)
 
-    def _add(self, value: Any) -> None:
+    def _add(self, value: object) -> None:
         if isinstance(value, np.ndarray):
             self.firsts.append(self.size)
             self.size += 1 + 2 * value.ndim
@@ -77,10 +77,10 @@ class _Layout:
 
 _one: dict[Kind, Kind] = {}  # one object for equal types, so that comparison is quick
 _numbers = count()  # thread-safe
-_layouts: dict[tuple[Any, ...], _Layout] = {}
+_layouts: dict[tuple[Hashable, ...], _Layout] = {}
 
 
-def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
+def pack(values: tuple[object, ...], store: Callable[[], Store | None]) -> Packed:
     """Return the words of arguments.
 
     Args:
@@ -90,9 +90,9 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     Raises:
         TraceError: If machine code does not support an argument.
     """
-    form: list[Any] = []
+    form: list[Hashable] = []
     arrays: list[np.ndarray] = []
-    numbers: list[Any] = []
+    numbers: list[SupportsInt] = []
     _flatten(values, form, arrays, numbers)
     shape = tuple(form)
     layout = _layouts.get(shape)
@@ -120,7 +120,7 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     return Packed(typed[1], typed[0], block, tuple([start + 8 * at for at in layout.starts]))
 
 
-def _flatten(values: tuple[Any, ...], form: list[Any], arrays: list[np.ndarray], numbers: list[Any]) -> None:
+def _flatten(values: tuple[Any, ...], form: list[Hashable], arrays: list[np.ndarray], numbers: list[Any]) -> None:
     """Append the arrays and numbers contained in values."""
     for value in values:
         kind = type(value)
@@ -141,10 +141,10 @@ def _flatten(values: tuple[Any, ...], form: list[Any], arrays: list[np.ndarray],
             numbers.append(value)
 
 
-_readers: list[Any] = []
+_readers: list[Callable[..., int]] = []
 
 
-def _reader(store: Callable[[], Store | None]) -> Any:
+def _reader(store: Callable[[], Store | None]) -> Callable[..., int]:
     """Return the function (addresses of first words, words and forms, array, array, …) that reads arrays."""
     if not _readers:
         key = digest(["arrays", sources_of_the_translator()])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from enum import Enum
 from types import FunctionType, ModuleType
-from typing import Any, NoReturn, final
+from typing import NoReturn, final
 
 import numpy as np
 from llvmlite import ir
 
+from robot_dyn.codegen.loops.dependencies import Instead
 from robot_dyn.codegen.loops.function import Function
 from robot_dyn.codegen.loops.kinds import (
     BOOL,
@@ -29,7 +30,9 @@ from robot_dyn.codegen.loops.kinds import (
 )  # fmt: skip
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.loops.values import (
+    UNWRITTEN,
     ArrayValue,
+    Builder,
     Scalar,
     StaticValue,
     Value,
@@ -41,11 +44,7 @@ from robot_dyn.codegen.loops.values import (
 )  # fmt: skip
 
 Refuse = Callable[[str, str], NoReturn]
-Instead = Mapping[Any, Callable[..., Any]]
-_WORDS: Any = np.uint64
-_TRUTHS: Any = (bool, np.bool_)
-_INTEGERS: Any = (int, np.integer)
-_STATIC: Any = (str, tuple, ModuleType, type, Enum)
+_WORDS: type[np.unsignedinteger] = np.uint64
 
 
 @final
@@ -62,9 +61,9 @@ class Program:
     def __init__(self, module: ir.Module, prefix: str, instead: Instead) -> None:
         self.module, self.prefix, self.instead = module, prefix, instead
         self._unchecked = {function for function in instead.values() if not hasattr(function, "emits")}
-        self._done: dict[tuple[Callable[..., Any], tuple[Kind, ...]], Written | None] = {}
-        self._texts: dict[str, Any] = {}
-        self._arrays: dict[int, tuple[np.ndarray, Any]] = {}
+        self._done: dict[tuple[FunctionType, tuple[Kind, ...]], Written | None] = {}
+        self._texts: dict[str, ir.Value] = {}
+        self._arrays: dict[int, tuple[np.ndarray, ir.Value]] = {}
         self._invariant = module.add_metadata([])
 
     def written(self, function: FunctionType, kinds: tuple[Kind, ...], refuse: Refuse) -> Written:
@@ -94,13 +93,13 @@ class Program:
         entry = ir.Function(self.module, shape, f"{self.prefix}{name}")
         b = ir.IRBuilder(entry.append_basic_block())
         addresses, out = entry.args
-        parts: list[Any] = []
+        parts: list[ir.Value] = []
         for i, kind in enumerate(kinds):
             pointer = self.invariant_load(b, b.gep(addresses, [ir.Constant(I64, i)]))
             parts += self._loaded(b, pointer, kind)
         result = b.call(written.ir, parts)
         count = written.may_fail + len(leaves(self._nothing(written.result)))
-        results = [result] if count == 1 else [b.extract_value(result, i) for i in range(count)]
+        results: list[ir.Value] = [result] if count == 1 else [b.extract_value(result, i) for i in range(count)]
         text, results = (results[0], results[1:]) if written.may_fail else (ir.Constant(TEXT, None), results)
         for i, value in enumerate(results):
             b.store(_word(b, value), b.gep(out, [ir.Constant(I64, i)]))
@@ -115,9 +114,9 @@ class Program:
     def _nothing(kind: Kind) -> Value:
         if not _only_numbers(kind):
             raise SubsetError("a function that returns an array cannot be called from Python; write into an argument")
-        return of_leaves(kind, [None] * words(kind))
+        return of_leaves(kind, [UNWRITTEN] * words(kind))
 
-    def _loaded(self, b: Any, pointer: Any, kind: Kind) -> list[Any]:
+    def _loaded(self, b: Builder, pointer: ir.Value, kind: Kind) -> list[ir.Value]:
         """Return the parts of an argument, loaded from its words."""
         if isinstance(kind, RecordKind):
             return [pointer]
@@ -131,26 +130,26 @@ class Program:
             return []
         return leaves(self.read(b, pointer, kind, 0))
 
-    def read(self, b: Any, pointer: Any, kind: Number | ArrayKind, first: int) -> Value:
+    def read(self, b: Builder, pointer: ir.Value, kind: Number | ArrayKind, first: int) -> Value:
         """Return a number or an array, loaded from its words."""
         loaded = [self.invariant_load(b, b.gep(pointer, [ir.Constant(I64, first + i)])) for i in range(words(kind))]
         if isinstance(kind, Number):
-            of_word = loaded[0] if kind.llvm == I64 else None
-            of_word = b.trunc(loaded[0], kind.llvm) if kind == BOOL else of_word
-            return Scalar(kind, b.bitcast(loaded[0], kind.llvm) if kind == FLOAT else of_word)
+            if kind.llvm == I64:
+                return Scalar(kind, loaded[0])
+            return Scalar(kind, (b.trunc if kind == BOOL else b.bitcast)(loaded[0], kind.llvm))
         n = kind.ndim
         lengths, apart = loaded[1 : 1 + n - kind.single], loaded[1 + n : 1 + 2 * n - kind.single]
         bytes_ = ir.Constant(I64, 1 if kind.of == BOOL else 8)
         apart = [] if kind.contiguous else [b.sdiv(stride, bytes_, flags=("exact",)) for stride in apart]
         return of_leaves(kind, [b.inttoptr(loaded[0], kind.of.stored.as_pointer()), *lengths, *apart])
 
-    def invariant_load(self, b: Any, pointer: Any) -> Any:
+    def invariant_load(self, b: Builder, pointer: ir.Value) -> ir.Value:
         """Load a value that does not change while machine code runs."""
         loaded = b.load(pointer)
         loaded.set_metadata("invariant.load", self._invariant)
         return loaded
 
-    def external(self, name: str, result: Any, *arguments: Any) -> Any:
+    def external(self, name: str, result: ir.Type, *arguments: ir.Type) -> ir.Value:
         """Return a function of the C library."""
         if name in self.module.globals:
             return self.module.globals[name]
@@ -158,7 +157,7 @@ class Program:
         function.attributes.add("nobuiltin")  # LLVM would replace some powers by a square root or a product
         return function
 
-    def text(self, text: str) -> Any:
+    def text(self, text: str) -> ir.Value:
         """Return the address of a text."""
         if text not in self._texts:
             data = bytearray(text.encode() + b"\0")
@@ -166,24 +165,24 @@ class Program:
             self._texts[text] = self._global(kind, data).bitcast(TEXT)
         return self._texts[text]
 
-    def _global(self, kind: ir.Type, data: Any) -> Any:
-        variable: Any = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
+    def _global(self, kind: ir.Type, data: object) -> ir.GlobalVariable:
+        variable = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
         variable.linkage, variable.global_constant, variable.initializer = "internal", True, ir.Constant(kind, data)
         return variable
 
-    def constant(self, value: Any, refuse: Refuse) -> Value:
+    def constant(self, value: object, refuse: Refuse) -> Value:
         """Return a value that is fixed when the function is translated."""
         if isinstance(value, _WORDS):
             return word(int(value))
-        if isinstance(value, _TRUTHS):
+        if isinstance(value, bool | np.bool_):
             return number(bool(value))
         if isinstance(value, float):
             return number(float(value))
-        if isinstance(value, _INTEGERS) and -(2**63) <= value < 2**63:
+        if isinstance(value, int | np.integer) and -(2**63) <= value < 2**63:
             return number(int(value))
         if isinstance(value, np.ndarray):
             return self._constant_array(value)
-        if isinstance(value, _STATIC) or value is None or callable(value):
+        if isinstance(value, str | tuple | ModuleType | type | Enum) or value is None or callable(value):
             return StaticValue(value)
         return refuse(f"a value of type {type(value).__name__}", "use numbers, arrays, tuples and functions")
 
@@ -198,7 +197,7 @@ class Program:
         return ArrayValue(kind, self._arrays[id(x)][1], tuple(number(length) for length in x.shape))
 
 
-def _word(b: Any, value: Any) -> Any:
+def _word(b: ir.IRBuilder, value: ir.Value) -> ir.Value:
     if value.type == I64:
         return value
     return b.zext(value, I64) if value.type == BOOL.llvm else b.bitcast(value, I64)
@@ -210,6 +209,6 @@ def _only_numbers(kind: Kind) -> bool:
     return isinstance(kind, Number | Static)
 
 
-def translated(function: Any, kinds: tuple[Kind, ...], instead: Instead) -> Kind:
+def translated(function: FunctionType, kinds: tuple[Kind, ...], instead: Instead) -> Kind:
     """Translate a function for arguments of these types, only for the type of its result and its errors."""
     return Program(ir.Module(), "", instead).written(function, kinds, Program._alone).result

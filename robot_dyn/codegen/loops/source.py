@@ -20,7 +20,7 @@ class SubsetError(TraceError):
     """A construct that is not translated to machine code."""
 
 
-def refused(function: Callable[..., Any], line: int, construct: str, remedy: str) -> SubsetError:
+def refused(function: Callable[..., object], line: int, construct: str, remedy: str) -> SubsetError:
     """Return the error of a construct, with its line and a remedy."""
     code = function.__code__
     return SubsetError(
@@ -28,7 +28,7 @@ def refused(function: Callable[..., Any], line: int, construct: str, remedy: str
     )
 
 
-def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
+def syntax(function: Callable[..., object]) -> ast.FunctionDef:
     """Return the syntax tree of a function.
 
     Raises:
@@ -50,7 +50,7 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     return trees[place]
 
 
-def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
+def names_of(function: FunctionType) -> Mapping[str, object]:
     """Return the values of names that a function does not assign: from its closure, its module, and Python."""
     closure = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):

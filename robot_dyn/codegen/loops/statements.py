@@ -13,7 +13,9 @@ from llvmlite import ir
 from robot_dyn.codegen.loops import arrays, expressions, numbers
 from robot_dyn.codegen.loops.kinds import I64, INT
 from robot_dyn.codegen.loops.values import (
+    UNWRITTEN,
     ArrayValue,
+    Builder,
     Scalar,
     StaticValue,
     TupleValue,
@@ -144,10 +146,10 @@ def _for(f: Function, node: ast.For) -> bool:
 
 
 @contextmanager
-def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, Any]]:
+def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, tuple[ir.Block, ir.Block]]]:
     """Write a loop over a range: yield its index, and the blocks of the next iteration and after the loop."""
     b = f.builder
-    slot = None if f.silent else _slot(b)
+    slot = UNWRITTEN if f.silent else _slot(b)
     b.store(start.ir, slot)
     head, body, following, done = (b.append_basic_block(name) for name in ("head", "body", "next", "done"))
     b.branch(head)
@@ -164,7 +166,7 @@ def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tup
     b.position_at_end(done)
 
 
-def _slot(b: Any) -> Any:
+def _slot(b: Builder) -> ir.Value:
     """Reserve memory for a counter at the start of the function, so that loops do not exhaust the stack."""
     with b.goto_entry_block():
         return b.alloca(I64)
@@ -184,10 +186,10 @@ def _range(f: Function, node: ast.expr) -> tuple[Scalar, Scalar, int] | None:
     step = bounds[2] if len(bounds) == 3 else number(1)
     if not step.const:
         raise f.refused(node, "a range whose step is not a constant other than 0", "write a while loop")
-    return start, stop, step.const
+    return start, stop, int(step.const)
 
 
-def _body(f: Function, nodes: list[ast.stmt], following: Any, done: Any) -> list[set[str]]:
+def _body(f: Function, nodes: list[ast.stmt], following: ir.Block, done: ir.Block) -> list[set[str]]:
     """Write the body of a loop; return the names assigned at each of its breaks."""
     breaks: list[set[str]] = []
     f.leaving.append((following, done, breaks))

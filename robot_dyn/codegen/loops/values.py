@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, Final, final
 
 from llvmlite import ir
 
@@ -23,6 +23,27 @@ from robot_dyn.codegen.loops.kinds import (
     TupleKind,
 )
 
+UNWRITTEN = ir.Constant(I64, ir.Undefined)
+"""Placeholder of all LLVM values while types are inferred and nothing is written."""
+
+
+@final
+class _Silent:
+    """Substitute for LLVM's builder that writes nothing, while types are inferred."""
+
+    block: Any = None
+
+    def __getattr__(self, name: str) -> Any:
+        return _unwritten
+
+
+def _unwritten(*_: object, **__: object) -> ir.Value:
+    return UNWRITTEN
+
+
+SILENT: Final = _Silent()
+Builder = ir.IRBuilder | _Silent
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -36,8 +57,8 @@ class Scalar:
     """
 
     kind: Number
-    ir: Any
-    const: Any = None
+    ir: ir.Value
+    const: float | None = None
 
 
 @final
@@ -46,11 +67,11 @@ class ArrayValue:
     """An array: the address of its first entry, its lengths, and its strides in entries unless it is contiguous."""
 
     kind: ArrayKind
-    data: Any
+    data: ir.Value
     shape: tuple[Scalar, ...]
     apart: tuple[Scalar, ...] = ()
 
-    def strides(self, builder: Any) -> tuple[Scalar, ...]:
+    def strides(self, builder: Builder) -> tuple[Scalar, ...]:
         """Return the strides, in entries."""
         if not self.kind.contiguous:
             return self.apart
@@ -66,7 +87,7 @@ class RecordValue:
     """A named tuple, referenced by the address of its words."""
 
     kind: RecordKind
-    pointer: Any
+    pointer: ir.Value
 
 
 @final
@@ -87,7 +108,7 @@ class TupleValue:
 class StaticValue:
     """A value fixed when the function is translated."""
 
-    value: Any
+    value: object
 
     @property
     def kind(self) -> Static:
@@ -106,7 +127,7 @@ class Written:
         may_fail: True if it returns the text of a failure first.
     """
 
-    ir: Any
+    ir: ir.Function
     result: Kind
     may_fail: bool
 
@@ -140,7 +161,7 @@ def leaf_types(kind: Kind) -> list[ir.Type]:
     return [] if isinstance(kind, Static) else [leaf for item in kind.items for leaf in leaf_types(item)]
 
 
-def leaves(value: Value) -> list[Any]:
+def leaves(value: Value) -> list[ir.Value]:
     """Return the LLVM values of the parts."""
     if isinstance(value, Scalar):
         return [value.ir]
@@ -152,7 +173,7 @@ def leaves(value: Value) -> list[Any]:
     return [] if isinstance(value, StaticValue) else [leaf for item in value.items for leaf in leaves(item)]
 
 
-def of_leaves(kind: Kind, parts: Sequence[Any]) -> Value:
+def of_leaves(kind: Kind, parts: Sequence[ir.Value]) -> Value:
     """Return the value that consists of these parts."""
     if isinstance(kind, Number):
         return Scalar(kind, parts[0])
@@ -173,7 +194,7 @@ def of_leaves(kind: Kind, parts: Sequence[Any]) -> Value:
     return TupleValue(tuple(items))
 
 
-def times(x: Scalar, y: Scalar, builder: Any) -> Scalar:
+def times(x: Scalar, y: Scalar, builder: Builder) -> Scalar:
     """Return a product of lengths, which does not overflow."""
     if x.const is not None and y.const is not None:
         return number(x.const * y.const)

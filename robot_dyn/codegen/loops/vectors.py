@@ -5,20 +5,20 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from llvmlite import ir
 
 from robot_dyn.codegen.loops import arrays
 from robot_dyn.codegen.loops.kinds import I64, Number
-from robot_dyn.codegen.loops.values import ArrayValue, Scalar, Value
+from robot_dyn.codegen.loops.values import ArrayValue, Builder, Scalar, Value
 
 if TYPE_CHECKING:
     from robot_dyn.codegen.loops.function import Function
 
 WIDTHS = 8, 4, 1
 ZERO = ir.Constant(I64, 0)
-Rule = Callable[..., Any]  # (builder, numbers or vectors of them) → the same
+Rule = Callable[..., ir.Value]  # (builder, numbers or vectors of them) → the same
 
 
 def elementwise(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value], rule: Rule) -> None:
@@ -49,7 +49,7 @@ def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> 
         raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
 
 
-def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, Any]]:
+def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, ir.Value]]:
     """Yield loops over entries by vectors: first of the largest width, then of smaller ones for the remainder."""
     b, first = f.builder, ZERO
     for width in widths:
@@ -60,7 +60,7 @@ def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tupl
 
 
 @contextmanager
-def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
+def steps(b: Builder, start: ir.Value, stop: ir.Value, step: int) -> Iterator[ir.Value]:
     """Write a loop in steps, with a phi instead of a variable."""
     before, head, body, done = b.block, *(b.append_basic_block() for _ in range(3))
     b.branch(head)
@@ -75,23 +75,23 @@ def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
     b.position_at_end(done)
 
 
-def kind(width: int, of: Number) -> Any:
+def kind(width: int, of: Number) -> ir.Type:
     """Return the LLVM type of a vector of numbers."""
     return of.stored if width == 1 else ir.VectorType(of.stored, width)
 
 
-def loaded(b: Any, data: Any, at: Any, width: int, of: Number) -> Any:
+def loaded(b: Builder, data: ir.Value, at: ir.Value, width: int, of: Number) -> ir.Value:
     """Load a vector of entries."""
     return b.load(b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer()), align=_bytes(of))
 
 
-def stored(b: Any, value: Any, data: Any, at: Any, width: int, of: Number) -> None:
+def stored(b: Builder, value: ir.Value, data: ir.Value, at: ir.Value, width: int, of: Number) -> None:
     """Store a vector of entries."""
     pointer = b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer())
     b.store(value, pointer, align=_bytes(of))
 
 
-def spread(b: Any, x: Any, width: int, of: Number) -> Any:
+def spread(b: Builder, x: ir.Value, width: int, of: Number) -> ir.Value:
     """Return a vector with copies of one number."""
     if width == 1:
         return x

@@ -64,9 +64,11 @@ class SymbolicDynamics(Dynamics[Symbols]):
             self._traced[name] = self._trace.quantity(name)
         return self._traced[name]
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Any:
         if frame:  # queries of frames do not need inertias
-            return self._trace.lagrangian._answer(name, state, out, errors, frame).view(Symbols)
+            return self._trace.lagrangian._answer(name, state, out, frame, nan=nan).view(Symbols)
         value = array_of(self._quantity(name).function(*map(column, state), *self._given))
         shape = self._trace.shape(name)
         return value[0, 0] if shape == (1,) else value.reshape(shape).view(Symbols)

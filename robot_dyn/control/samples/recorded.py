@@ -18,7 +18,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
 
 # headings other than t and q in the table of a run
-_OF_A_RUN = re.compile(r"([vau]|tau|power|start|desired|deviation) .*|energy|residual|.* state \d+")
+_OF_A_RUN = re.compile(r"([vau]|tau|power|start|desired|tracking error) .*|energy|residual|.* state \d+")
 _LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and its powers do not overflow
 _STEPS = 1e-12, 1e15  # [s]: fifth powers of such steps neither vanish nor overflow
 _NAME_JOINTS = "joints={joint: column}, --joint JOINT=COLUMN on the command line"

@@ -1,1 +1,1 @@
-"""Two runs beside each other: how far they are apart, when they part, and which settings differ."""
+"""Comparison of two runs: their difference, the time at which they part, and the settings that differ."""

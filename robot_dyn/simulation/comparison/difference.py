@@ -1,14 +1,14 @@
 """The difference of two runs of one robot: their motion at common times, and the settings that differ.
 
-Two runs part where |q_b − q_a| of a joint is above twice the sum of their estimated errors, which are no bounds, or
-above a tolerance where one of them has no estimate. They are compared at common samples. In stretches without any,
-q of each run is interpolated at the samples of the other by the quintics of (q, v, a), where that is sound: no event is
-near, and the error of interpolation is bounded by half of what they part beyond. The bound at samples h apart is
+Two runs part where |q_b − q_a| of a joint exceeds twice the sum of their estimated errors, which are not bounds, or a
+tolerance if one of them has no estimate. They are compared at common samples. Between these, q of each run is
+interpolated at the samples of the other by quintics of (q, v, a), if no event is near and the error of interpolation is
+at most half of the difference at which runs part. The bound at samples h apart is
 
     δ = max |q_j − p| + h |v_j − p'| + h² |a_j − p''|,    p the quintic between the two neighbours of sample j
 
-over the samples j next to it. Where q is smooth, δ is 400 times the error; of an interval that hides one impact, one
-jump of a force, or one of its rate, the error is below δ wherever in the interval that is.
+over the samples j next to it. If q is smooth, δ is 400 times the error. If an interval contains one impact, or one jump
+of a force or of its rate, the error is below δ anywhere in the interval.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 1e-6  # [rad] or [m], for runs without an estimate of their error
-HALF = 0.5  # of the time: runs that are compared over less of it are not said to be the same motion
-_MARGIN = 2.0  # of estimated errors
-_ROUNDING = 1e-12  # of the largest |q|: runs that differ by less are not said to part
-_SAME = 8 * np.finfo(float).eps  # of the largest time: samples of one time, computed in two ways
-_PART = 0.5  # of the difference up to which runs are the same motion: what interpolation may add to it
-_NEIGHBOUR = 0.5  # of the length of an interval: a shorter one next to it does not bound its error
+HALF = 0.5  # of the time: least fraction that must be compared to conclude that runs are the same motion
+_MARGIN = 2.0  # factor on estimated errors
+_ROUNDING = 1e-12  # of the largest |q|: a smaller difference is rounding
+_SAME = 8 * np.finfo(float).eps  # of the largest time: difference of one time computed in two ways
+_PART = 0.5  # of the difference up to which runs are the same motion: largest error of interpolation
+_NEIGHBOUR = 0.5  # of the length of an interval: a shorter neighbour does not bound its error
 _CHUNK = 20_000  # times at which a run is interpolated at once
 
 
@@ -39,16 +39,16 @@ class Difference:
     """b − a at k times of two runs.
 
     Attributes:
-        joint_names: Of the n joints.
-        start, end: The time that both runs have, in [s].
+        joint_names: Names of the n joints.
+        start, end: First and last time of both runs, in [s].
         t: The times at which they are compared, (k,), in [s].
-        q, v, u: b − a, (k, n); nan where it was not recorded; v and u are nan between common samples.
-        is_common: Whether both runs have a sample at each time, (k,); at the others, q of one run is interpolated.
-        bound: Difference of q, (k,), up to which the runs are the same motion; inf where that is not known.
+        q, v, u: b − a, (k, n); nan if not recorded; v and u are nan between common samples.
+        is_common: True at times when both runs have a sample, (k,); at the others, q of one run is interpolated.
+        bound: Difference of q, (k,), up to which the runs are the same motion; inf if unknown.
         interpolation: Largest error of interpolation that the bounds allow for; 0 if no time is interpolated.
-        fraction: Fraction of the common time that was compared: of intervals between neighbouring times of t that hide
-            further samples of one run at most.
-        estimated: Whether the bound is of the estimated errors of both.
+        fraction: Fraction of the common time that was compared: intervals between neighbouring times of t in which at
+            most one run has further samples.
+        estimated: True if the bound is computed from the estimated errors of both.
     """
 
     joint_names: tuple[str, ...]
@@ -72,18 +72,18 @@ class Difference:
 
     @property
     def is_conclusive(self) -> bool:
-        """Whether enough of the time was compared to say that runs do not part."""
+        """True if enough of the time was compared to conclude that runs do not part."""
         return self.fraction >= HALF
 
     @property
     def judged_until(self) -> float:
-        """The last time before the first one at which the bound is not known, in [s]."""
-        known = np.cumsum(np.isinf(self.bound)) == 0
-        return float(self.t[known][-1]) if known.any() else self.start
+        """The last time before the first unknown bound, in [s]."""
+        bounded = np.cumsum(np.isinf(self.bound)) == 0
+        return float(self.t[bounded][-1]) if bounded.any() else self.start
 
 
 def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
-    """QueryError unless two runs are of one robot, and have times in common."""
+    """Raise a QueryError unless two runs are of one robot and have times in common."""
     names = tuple(run.about.get("robot", "") for run in (a, b))
     if a.joint_names != b.joint_names:
         of = [f"{name or 'a robot'} ({', '.join(x.joint_names)})" for name, x in zip(names, (a, b), strict=True)]
@@ -99,7 +99,7 @@ def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
 
 
 def comparable(a: TrajectoryData, b: TrajectoryData) -> bool:
-    """Whether two runs are of one robot, and have times in common."""
+    """Return True if two runs are of one robot and have times in common."""
     try:
         check_comparable(a, b)
     except QueryError:
@@ -109,15 +109,15 @@ def comparable(a: TrajectoryData, b: TrajectoryData) -> bool:
 
 @np.errstate(all="ignore")  # the last samples of a run that diverged may overflow
 def difference(a: TrajectoryData, b: TrajectoryData, tolerance: float = TOLERANCE) -> Difference:
-    """Return b − a on the time that both runs have.
+    """Return b − a over the time common to both runs.
 
     Args:
         a: A run.
-        b: Another one of the same robot.
-        tolerance: Difference of q above which they part, in [rad] or [m], where one has no estimate of its error.
+        b: Another run of the same robot.
+        tolerance: Difference of q above which they part, in [rad] or [m], if one has no estimate of its error.
 
     Raises:
-        QueryError: If they are of different robots, or have no time in common.
+        QueryError: If the robots differ, or the runs have no time in common.
     """
     check_comparable(a, b)
     start, end = float(max(a.t[0], b.t[0])), float(min(a.t[-1], b.t[-1]))
@@ -128,7 +128,7 @@ def difference(a: TrajectoryData, b: TrajectoryData, tolerance: float = TOLERANC
                              for run, at in zip((a, b), inside, strict=True)))  # fmt: skip
 
     def allowed(t: np.ndarray) -> np.ndarray:
-        """Difference of q, (k,), that their errors explain."""
+        """Return the difference of q, (k,), that their errors explain."""
         if not (estimated and a.error is not None and b.error is not None):
             return np.full(len(t), max(tolerance, floor))
         return np.maximum(_MARGIN * (a.error.at(t) + b.error.at(t)), floor)
@@ -143,7 +143,7 @@ def difference(a: TrajectoryData, b: TrajectoryData, tolerance: float = TOLERANC
         limit[np.isinf(limit)] = max(limit[np.isfinite(limit)].max(initial=0.0), tolerance)
         sound = between <= _PART * limit
         parts.append((run.t[at][sound], sign * (q - run.q[at])[sound], between[sound]))
-    t, q, between = (np.concatenate(each) for each in zip(*parts, strict=True))
+    t, q, between = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     order = np.argsort(t, kind="stable")
     unknown = np.full((len(t) - len(i), len(a.joint_names)), nan)
     v, u = (np.concatenate([x[j] - y[i], unknown])[order] for x, y in ((b.v, a.v), (b.u, a.u)))
@@ -158,7 +158,7 @@ def difference(a: TrajectoryData, b: TrajectoryData, tolerance: float = TOLERANC
 
 
 def _fraction(start: float, end: float, t: np.ndarray, of_a: np.ndarray, of_b: np.ndarray) -> float:
-    """Fraction of the time that was compared at times t, of runs with further samples."""
+    """Return the fraction of the time that was compared at times t, from the other samples of both runs."""
     if not start < end:
         return float(len(t) > 0)
     hidden = [np.bincount(np.searchsorted(t, np.setdiff1d(x, t)), minlength=len(t) + 1)[1:-1] for x in (of_a, of_b)]
@@ -166,12 +166,12 @@ def _fraction(start: float, end: float, t: np.ndarray, of_a: np.ndarray, of_b: n
 
 
 def _not_among(t: np.ndarray, inside: np.ndarray, common: np.ndarray) -> np.ndarray:
-    """Indices of the last samples at their times, without those that are common."""
+    """Return the indices of the last sample at each time, without the common samples."""
     return np.setdiff1d(inside[_last(t[inside])], common, assume_unique=True)
 
 
 def _common(t: np.ndarray, s: np.ndarray, of_t: np.ndarray, of_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of samples of one time."""
+    """Return the indices of samples of two runs at the same times."""
     of_t, of_s = of_t[_last(t[of_t])], of_s[_last(s[of_s])]
     if not (len(of_t) and len(of_s)):
         return of_t[:0], of_s[:0]
@@ -182,45 +182,52 @@ def _common(t: np.ndarray, s: np.ndarray, of_t: np.ndarray, of_s: np.ndarray) ->
 
 
 def _last(t: np.ndarray) -> np.ndarray:
-    """Whether each of increasing times is the last of equal ones: a run may have several samples at a time."""
+    """Return True for the last of equal times, in increasing order: a run may have several samples at a time."""
     return np.append(np.diff(t) > 0, np.ones(min(len(t), 1), dtype=bool))
 
 
 def _interpolated(run: TrajectoryData, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (k, n) of a run at times t within it, and the bound of their error, (k,); inf where there is none."""
+    """Return positions (k, n) of a run at times t within it, and the bound on their error, (k,); inf if unbounded."""
     at = np.flatnonzero(_last(run.t))
-    known, points = run.t[at], np.stack([run.q[at], run.v[at], run.a[at]], axis=1)
-    if len(known) < 3:
+    times, points = run.t[at], np.stack([run.q[at], run.v[at], run.a[at]], axis=1)
+    if len(times) < 3:
         return np.full((len(t), points.shape[2]), nan), np.full(len(t), inf)
     events = np.array([event.t for event in run.events])
-    slack = _SAME * known[-1]
-    eventful = np.searchsorted(events, known[:-1] - slack) < np.searchsorted(events, known[1:] + slack, "right")
-    chunks = [_of_quintics(known, points, eventful, t[k : k + _CHUNK]) for k in range(0, max(len(t), 1), _CHUNK)]
-    q, bound = (np.concatenate(each) for each in zip(*chunks, strict=True))
+    slack = _SAME * times[-1]
+    eventful = np.searchsorted(events, times[:-1] - slack) < np.searchsorted(events, times[1:] + slack, "right")
+    chunks = [_of_quintics(times, points, eventful, t[k : k + _CHUNK]) for k in range(0, max(len(t), 1), _CHUNK)]
+    q, bound = (np.concatenate(arrays) for arrays in zip(*chunks, strict=True))
     return q, bound
 
 
 def _of_quintics(
-    known: np.ndarray, points: np.ndarray, eventful: np.ndarray, t: np.ndarray
+    times: np.ndarray, points: np.ndarray, eventful: np.ndarray, t: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`_interpolated` from samples (m, 3, n) of q, v and a at times (m,), and whether an event is between two."""
-    i = (np.searchsorted(known, t, "right") - 1).clip(0, len(known) - 2)
-    h = known[i + 1] - known[i]
+    """Return the result of `_interpolated` at times t.
+
+    Args:
+        times: Times of samples, (m,).
+        points: q, v and a there, (m, 3, n).
+        eventful: True for intervals between samples that contain an event, (m − 1,).
+        t: Times, (k,).
+    """
+    i = (np.searchsorted(times, t, "right") - 1).clip(0, len(times) - 2)
+    h = times[i + 1] - times[i]
     bound = np.full(len(t), -inf)
     for j in (i, i + 1):  # samples next to t
-        before, after = np.maximum(j - 1, 0), np.minimum(j + 1, len(known) - 1)
-        neighbour = np.where(j == i, known[i] - known[before], known[after] - known[i + 1])
+        before, after = np.maximum(j - 1, 0), np.minimum(j + 1, len(times) - 1)
+        neighbour = np.where(j == i, times[i] - times[before], times[after] - times[i + 1])
         usable = (neighbour >= _NEIGHBOUR * h) & ~eventful[before] & ~eventful[np.minimum(j, len(eventful) - 1)]
-        off = np.abs(points[j] - np.stack(_quintic(known, points, before, after, known[j]), axis=1))
+        off = np.abs(points[j] - np.stack(_quintic(times, points, before, after, times[j]), axis=1))
         sizes = (off * (h[:, None] ** np.arange(3))[:, :, None]).sum(axis=1).max(axis=1)
         bound = np.where(usable, np.maximum(bound, sizes), bound)
     bound = np.where((bound >= 0) & ~eventful[i], bound, inf)
-    return _quintic(known, points, i, i + 1, t)[0], bound
+    return _quintic(times, points, i, i + 1, t)[0], bound
 
 
 def _quintic(
-    known: np.ndarray, points: np.ndarray, i: np.ndarray, j: np.ndarray, t: np.ndarray
+    times: np.ndarray, points: np.ndarray, i: np.ndarray, j: np.ndarray, t: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q, v and a at times t of the quintics between samples i and j, each (k, n)."""
-    c = hermite(known[j] - known[i], np.concatenate([points[i], points[j]], axis=1))
-    return polynomial(c, (t - known[i])[:, None])
+    """Return q, v and a at times t of the quintics between samples i and j, (k, n) each."""
+    c = hermite(times[j] - times[i], np.concatenate([points[i], points[j]], axis=1))
+    return polynomial(c, (t - times[i])[:, None])

@@ -43,13 +43,13 @@ def engine_of(setup: Setup, seen: float) -> Engine:
     """Return the engine of a setup, for `choose`, which caches it."""
     required = setup.engine == "compiled"
     try:
-        identified = identify(setup.equation, setup.integrator)
-        code = existing(identified, setup.integrator, setup.finds_events)
+        identified = identify(setup.equation, setup.method)
+        code = existing(identified, setup.method, setup.finds_events)
         if code is not None:
             check(code, setup)
             return code
         if not required and not _is_worthwhile(setup, interpreted_before(identified), seen):
-            most = _COMPILED / _in_all(setup, setup.equation.size) if setup.integrator.controls_error else inf
+            most = _COMPILED / _in_all(setup, setup.equation.size) if setup.method.controls_error else inf
             return interpreted_engine(setup, "short: compiling is not worthwhile", most)
         return checked(setup, lambda: _of_one_run(setup))
     except (ImportError, RobotDynError) as error:
@@ -103,7 +103,7 @@ def checked(setup: Setup, build: Callable[[], MachineCode]) -> MachineCode:
 
 
 def _of_one_run(setup: Setup, swept: tuple[str, ...] = ()) -> MachineCode:
-    return machine_code(setup.equation, setup.integrator, swept=swept, cuts=setup.finds_events)
+    return machine_code(setup.equation, setup.method, swept=swept, cuts=setup.finds_events)
 
 
 def _is_worthwhile(setup: Setup, before: list[float], seen: float) -> bool:
@@ -120,13 +120,13 @@ def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
     from robot_dyn.simulation.compiled.loop import loop_of
 
-    method, holds = setup.integrator, bool(setup.plant.equation_of_motion.set_valued)
+    method, holds = setup.method, bool(setup.plant.equation_of_motion.set_valued)
     return method.plain and loop_of(method, setup.finds_events, holds=holds).is_kept()
 
 
 def _evaluations(setup: Setup, size: int) -> float:
     """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
-    method: Any = setup.integrator
+    method: Any = setup.method
     if method.controls_error:
         of_run = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
     else:
@@ -136,11 +136,11 @@ def _evaluations(setup: Setup, size: int) -> float:
 
 def _in_all(setup: Setup, size: int) -> float:
     """Evaluations for each one of a run: those of its Jacobians, and of its companions by halved and by other steps."""
-    companions = (2 if setup.integrator.controls_error else 1) if setup.estimate_error else 0
+    companions = (2 if setup.method.controls_error else 1) if setup.estimate_error else 0
     return (1 + companions) * _with_jacobians(setup, size)
 
 
 def _with_jacobians(setup: Setup, size: int) -> float:
     """Evaluations for each one of a step, those for a Jacobian by differences in each step included."""
-    method: Any = setup.integrator
+    method: Any = setup.method
     return 1 + 2 * size / (method.evaluations_per_step or _GUESSED) if method.needs_jacobian else 1

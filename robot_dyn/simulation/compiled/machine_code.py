@@ -173,8 +173,8 @@ class MachineCode:
         of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
         of[CONTROLLER] = equation.controller
         known = [
-            replace(each, value=np.broadcast_to(value_at(of[each.part], each.key), each.value.shape))
-            if each.part in of and value_at(of[each.part], each.key) is not None  # no mode is chosen yet
+            replace(each, value=np.broadcast_to(value, each.value.shape))
+            if each.part in of and (value := value_at(of[each.part], each.key)) is not None  # no mode is chosen yet
             else each
             for each in self.known
         ]

@@ -225,11 +225,11 @@ def _some(states: States) -> States:
 def _first_second(setup: Setup) -> Path:
     """The first second of a run by the interpreted engine, or as much of it as takes few evaluations; or its start."""
     span = min(setup.duration_s, _FIRST_S)
-    if not setup.integrator.controls_error:
-        span = min(span, _MOST / (setup.integrator.evaluations_per_step or 1) * setup.taken_step_s)
+    if not setup.method.controls_error:
+        span = min(span, _MOST / (setup.method.evaluations_per_step or 1) * setup.taken_step_s)
     for _ in range(_TRIES):
         short = replace(
-            setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
+            setup, duration_s=span, record_every_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
         record = Run(short, Interpreted(short.equation), samples=False, max_evaluations=_MOST).run()
         if not isinstance(record, Recording):

@@ -1,6 +1,6 @@
-"""Where operational-space control damps its task: the smallest eigenvalue of J M⁻¹ Jᵀ is below the threshold.
+"""Remarks on operational-space control that damps its task: the smallest eigenvalue of J M⁻¹ Jᵀ is below the threshold.
 
-There the arm no longer follows along a commanded direction.
+The arm then does not follow along a commanded direction.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ _MOST = 2000  # maximum number of states checked
 
 
 def damped(setup: Setup, record: Recording) -> Iterator[Remark]:
-    """A remark for each frame whose task is damped at a sample or at the end of a step."""
+    """Yield a remark for each frame whose task is damped at a sample or at the end of a step."""
     controller, n = setup.controller, setup.plant.dynamics.n
     if controller is None:
         return
-    parts = (controller, *(each.part for each in controller.parts))
-    tasks = [each for each in parts if isinstance(each, OperationalSpace)]
+    parts = (controller, *(block.part for block in controller.parts))
+    tasks = [part for part in parts if isinstance(part, OperationalSpace)]
     if not tasks:
         return
     t, first = np.unique(np.concatenate([record.t, record.step_log.t]), return_index=True)
     q = np.concatenate([record.y[:, :n], record.step_log.y[:, :n]])[first]
-    t, q = (each[np.isfinite(q).all(axis=1)] for each in (t, q))
+    t, q = (x[np.isfinite(q).all(axis=1)] for x in (t, q))
     rows = np.unique(np.linspace(0, len(t) - 1, min(len(t), _MOST)).astype(int))
     for task in tasks:
         yield from _of(task, t[rows], q[rows])

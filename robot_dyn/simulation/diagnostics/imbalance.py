@@ -1,64 +1,71 @@
-"""Why the energy ledger of a run does not close: work that nothing books, stops passed within a step, or long steps.
+"""The cause of an energy ledger that does not close: unbooked work, stops passed within a step, or long steps.
 
-dE/dt = Σ P_k   at every state, whatever the steps, if all work is booked;   E(t) − E(0) = Σ W_k(t) if steps are short
+dE/dt = Σ P_k   at every state, for steps of any length, if all work is booked
+E(t) − E(0) = Σ W_k(t)   if the steps are short
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError, call
+from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.samples import columns, ledger
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
-_LOOKS = 100  # at samples
-_WITHIN = 1e-4  # [rad], [m], [rad/s], [m/s]: by which a state is moved along its motion, for dE/dt
+_CHECKED = 100  # samples
+_WITHIN = 1e-4  # [rad], [m], [rad/s], [m/s]: displacement of a state along its motion, for dE/dt
 _UNBOOKED = 1e-3  # of the powers
-_FINER, _TIGHTER = 4, 100  # times as short steps, as small a tolerance
+_FINER, _TIGHTER = 4, 100  # factors of a smaller step and of a smaller tolerance
+
+_State = tuple[float, Array, Array, Array]  # t, q, v, a
 
 
-def cause(setup: Setup, run: Recording, contradicts: bool) -> str:
-    """Why the ledger of a run does not close, and what to do.
-
-    Args:
-        setup: What was run.
-        run: What it left behind.
-        contradicts: Whether it closes, but not as well as the estimated error of q implies.
-    """
+def cause(setup: Setup, run: Recording) -> Doubt:
+    """Return why the ledger of a run does not close, or not as well as its estimated error implies."""
     if run.outcome.ending is Ending.DIVERGED:
-        return "the run diverged"
-    if unbooked := _unbooked(setup.equation, run):
+        return Doubt(DoubtKind.DIVERGED)
+    if (unbooked := _unbooked(setup.equation, run)) is not None:
         return unbooked
-    method: Any = setup.integrator
-    doubt = "do not trust the estimate, " if contradicts else ""
-    if method.controls_error:
-        return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"
+    if setup.method.controls_error:
+        return finer(setup, Doubt(DoubtKind.LOOSE_TOLERANCE))
     missed = stepped_over(setup, run.step_log, 0.0) or cut_alike(setup, run)
-    why = "the steps are too long for the motion" if missed is None else f"{missed.why}, at t = {missed.t:.4g} s"
-    return f"{doubt}{why}; take step_s = {setup.taken_step_s / _FINER:.0e}"
+    if missed is None:
+        return finer(setup, Doubt(DoubtKind.LONG_STEPS))
+    return finer(setup, Doubt(missed.doubt.kind, missed.doubt.facts | {"at": missed.t}))
 
 
-def _unbooked(equation: StateEquation, run: Recording) -> str:
-    """What changes the energy beside the powers, at the sample where it does most; empty if that is not the cause.
+def finer(setup: Setup, doubt: Doubt) -> Doubt:
+    """Return a doubt with a smaller step or tolerance as its remedy."""
+    method = setup.method
+    if isinstance(method, Adaptive):
+        return Doubt(doubt.kind, doubt.facts | {"smaller_rtol": method.rtol / _TIGHTER})
+    return Doubt(doubt.kind, doubt.facts | {"smaller_step_s": setup.taken_step_s / _FINER})
 
-    A sample at which dE/dt jumps, as at a stop, shows nothing. Payloads that come and go change what the energy is of.
+
+def _unbooked(equation: StateEquation, run: Recording) -> Doubt | None:
+    """Return the largest change of energy at a sample that no power explains; None if that is not the cause.
+
+    Samples at which dE/dt jumps, for example at a stop, are ignored. So are runs with payloads, whose attachment
+    changes the energy.
     """
     if equation.equation_of_motion.payloads:
-        return ""
-    rows = np.unique(np.linspace(0, len(run.t) - 1, _LOOKS).astype(int))
+        return None
+    rows = np.unique(np.linspace(0, len(run.t) - 1, _CHECKED).astype(int))
     t, y = run.t[rows], run.y[rows]
-    q, v, a, _, _, P, _ = columns(equation, t, y, run.made[rows])
-    worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # on average, to leave the residual
-    advice = ""
+    q, v, a, _, _, P, _ = columns(equation, t, y, run.sampled[rows])
+    worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # mean power of half the residual
+    doubt = None
     for k in range(len(t)):
         state = float(t[k]), q[k], v[k], a[k]
         try:
@@ -66,34 +73,29 @@ def _unbooked(equation: StateEquation, run: Recording) -> str:
             flows = _slope(lambda *at: equation.energies(*at)[0], state, 1)
         except RobotDynError:
             continue
-        left = (before + after) / 2 - float(P[k].sum())
-        noticed = abs(left) > _UNBOOKED * (abs(flows) + float(np.abs(P[k]).sum()))
-        if noticed and abs(left) > worst and abs(after - before) < abs(left) / 2:
-            worst, advice = abs(left), _named(equation, state, left)
-    return advice
+        missing = (before + after) / 2 - float(P[k].sum())
+        noticed = abs(missing) > _UNBOOKED * (abs(flows) + float(np.abs(P[k]).sum()))
+        if noticed and abs(missing) > worst and abs(after - before) < abs(missing) / 2:
+            worst, doubt = abs(missing), _named(equation, state, missing)
+    return doubt
 
 
-def _slope(energy: Any, state: tuple[float, Array, Array, Array], side: float) -> float:
-    """The rate of an energy of (t, q, v) along the motion, by a difference to one side."""
+def _slope(energy: Callable[[float, Array, Array], Array | int], state: _State, side: float) -> float:
+    """Return the rate of an energy of (t, q, v) along the motion, by a difference to one side."""
     t, q, v, a = state
     s = side * _WITHIN / (1 + float(max(np.abs(v).max(), np.abs(a).max())))
     return float((energy(t + s, q + s * v, v + s * a) - energy(t, q, v)) / s)
 
 
-def _named(equation: StateEquation, state: tuple[float, Array, Array, Array], left: float) -> str:
-    """The part whose work is not booked, as far as it is known."""
+def _named(equation: StateEquation, state: _State, missing: float) -> Doubt:
+    """Return the doubt about the part whose work is not booked, if it is known."""
     t, q, v, _ = state
     dynamics, motion = equation.plant.dynamics, equation.equation_of_motion
+    facts: dict[str, float | str] = {"power": -missing, "at": t}
     for force in motion.forces:
         if not isinstance(force, Conservative):
             continue
         slope = _slope(lambda t, q, v, force=force: call(force.potential, dynamics, t, q), state, 1)
-        if abs(slope + float(call(force.torque, dynamics, t, q, v) @ v)) > abs(left) / 2:
-            return (
-                f"{force.name} does {-left:.2g} W at t = {t:.4g} s that its potential does not give; its torque must be"
-                " −∂E/∂q of a potential E(q), otherwise declare it Active"
-            )
-    return (
-        f"{-left:.2g} W at t = {t:.4g} s are work of no effect; M, C and N of the dynamics must belong to its energies,"
-        " and none of them may depend on time"
-    )
+        if abs(slope + float(call(force.torque, dynamics, t, q, v) @ v)) > abs(missing) / 2:
+            return Doubt(DoubtKind.WORK_OF_POTENTIAL, facts | {"effect": force.name})
+    return Doubt(DoubtKind.WORK_OF_NO_EFFECT, facts)

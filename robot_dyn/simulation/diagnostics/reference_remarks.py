@@ -1,4 +1,4 @@
-"""What a reference demands and the run cannot do: it jumps where it begins, or moves a joint that friction holds."""
+"""Remarks on references that a run cannot follow: a jump at the start, or motion of a joint that friction holds."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from robot_dyn.simulation.setup.setup import Setup
 
 _JUMP = 0.01  # of the range of a reference, or of its largest velocity
 _ROUNDING = 1e-9  # of a position
-_LOOKS = 2000  # at a reference
+_TIMES = 2000  # at which a reference is evaluated
 
 Units = list[tuple[str, str, str]]
 
 
 def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterator[tuple[Remark, np.ndarray]]:
-    """The joints whose reference does not begin where the joint is, or as fast as it moves there.
+    """Yield the joints whose reference starts at another position or velocity than the joint.
 
-    A reference rests before its first break. One that rests at all times is a set point, which may be anywhere. Each
-    remark is on the run with the largest jump, beside the jumps of all runs, (B,), 0 where there is none.
+    A reference rests before its first break. A reference that always rests is a set point, which may be anywhere. Each
+    remark concerns the run with the largest jump; it comes with the jumps of all runs, (B,), 0 for none.
 
     Args:
-        setup: What ran.
+        setup: The setup of the runs.
         q0: Positions at the start of each run, (B, n).
         v0: Velocities there, (B, n).
-        units: Of q, v and u of each joint.
+        units: Units of q, v and u of each joint.
     """
     reference = _joint_reference(setup)
     if reference is None or reference.start >= setup.duration_s:
@@ -48,13 +48,13 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
 
 
 def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
-    """The joints that dry friction holds at every step while their reference moves.
+    """Yield the joints that dry friction holds at every step while their reference moves.
 
     Args:
-        setup: What ran.
-        extremes: Of q, v and u over all steps, (3, 2, n).
+        setup: The setup of the run.
+        extremes: Extremes of q, v and u over all steps, (3, 2, n).
         t: Times of its samples, (m,), in [s].
-        units: Of q, v and u of each joint.
+        units: Units of q, v and u of each joint.
     """
     reference = _joint_reference(setup)
     if reference is None or not len(t):
@@ -75,7 +75,7 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
 
 
 def at_rest(extremes: np.ndarray) -> np.ndarray:
-    """Of extremes over all steps (…, 3, 2, n), which joints did not move, (…, n)."""
+    """Return True for joints that did not move, (…, n), from extremes over all steps (…, 3, 2, n)."""
     return (extremes[..., 0, 0, :] == extremes[..., 0, 1, :]) & (extremes[..., 1, :, :] == 0).all(axis=-2)
 
 
@@ -85,12 +85,12 @@ def _joint_reference(setup: Setup) -> PiecewisePolynomial | None:
 
 
 def _moves(q: np.ndarray) -> np.ndarray:
-    """Of which joints positions (k, n) differ by more than rounding, (n,)."""
+    """Return True for joints whose positions (k, n) differ by more than rounding, (n,)."""
     return np.ptp(q, axis=0) > _ROUNDING * np.maximum(1.0, np.abs(q).max(axis=0))
 
 
 def _along(setup: Setup, reference: PiecewisePolynomial) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity of a reference during a run, at equal times and at its first breaks, (k, n)."""
-    breaks = reference.breaks[(reference.breaks >= 0) & (reference.breaks <= setup.duration_s)][:_LOOKS]
-    q, v, _ = reference.at(np.concatenate([np.linspace(0.0, setup.duration_s, _LOOKS), breaks]))
+    """Return position and velocity of a reference during a run, at equidistant times and its first breaks, (k, n)."""
+    breaks = reference.breaks[(reference.breaks >= 0) & (reference.breaks <= setup.duration_s)][:_TIMES]
+    q, v, _ = reference.at(np.concatenate([np.linspace(0.0, setup.duration_s, _TIMES), breaks]))
     return q, v

@@ -1,6 +1,6 @@
 """Runs that reach an implausible speed, over 100 times a velocity limit, and steps that are too long as the cause.
 
-No arm moves like that: the error means nothing, and companion runs would take most of the time.
+No arm moves like that: an error estimate would be meaningless, and companion runs would take most of the time.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
     """Return the joint that has passed its speed limit most, its speed and the limit; empty if none has.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         speeds: Largest speed of each joint, (n,).
     """
     limits = cached(setup, speed_limits)
@@ -48,22 +48,26 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
     return {"joint": dynamics.joint_names[joint], "value": float(speeds[joint]), "limit": limit, "unit": unit_of_v}
 
 
-def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
-    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t."""
-    if setup.integrator.controls_error or setup.integrator.nonsmooth or setup.equation.canonical:
+def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[Remark, ...]:
+    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t.
+
+    Args:
+        setup: The setup of the run.
+        t: Time reached, in [s].
+        step_s: Longest step of the run, in [s]; None to find it from the setup.
+    """
+    if setup.method.controls_error or setup.method.nonsmooth or setup.equation.canonical:
         return ()
-    equation, step = setup.equation, setup.taken_step_s
+    equation, step = setup.equation, setup.taken_step_s if step_s is None else step_s
     y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
-        linear = setup.integrator, jacobian(equation, 0.0, y, held), len(setup.q0)
+        linear = setup.method, jacobian(equation, 0.0, y, held), len(setup.q0)
         if not excess_rate(*linear)(step) * t > log(EXPLAINS):
             return ()
         limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
-    facts: dict[str, float | str] = {
-        "method": setup.integrator.name, "motion": str(motion), "step_s": below(limit)
-    }  # fmt: skip
+    facts = motion.facts | {"method": setup.method.name, "step_s": below(limit)}
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 
@@ -71,12 +75,12 @@ def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Out
     """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         record: Its recording.
         fast: The joint that reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome
-    if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
+    if outcome.ending is not Ending.FINISHED or setup.method.controls_error:
         return outcome
     if remarks := step_too_long(setup, outcome.t):
         return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, dict(remarks[0].fields))

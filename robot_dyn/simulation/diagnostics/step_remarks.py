@@ -1,20 +1,20 @@
-"""Remarks on what was observed at every step: text, times, values and what to do."""
+"""Remarks on observations at every step: chatter, levels, coarse records, energy gains and creep."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Noise, Quantisation
 from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.differences import by_state, rowwise
-from robot_dyn.model.robot import Robot
-from robot_dyn.queries.units import unit
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.guard_levels import Level
@@ -23,28 +23,28 @@ from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
-Units = list[tuple[str, str, str]]  # of q, v and u of each joint
+Units = list[tuple[str, str, str]]  # units of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
 KINDS = RemarkKind.EFFORT_REACHED, RemarkKind.STOP_REACHED, RemarkKind.BEYOND  # of levels, in the order of a summary
-_HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
+_HIDDEN = 0.1  # of the range of a quantity: least excess over the samples next to a window
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
-_LAST, _LEAST = 0.1, 5  # part of a run in which creep is looked for, and samples in it
-_STEADY = 0.1  # of a velocity, by which it may change there
-_LOADED = 0.01, 0.96  # of the level of friction: less is rest, and with more a joint slides
+_LAST, _LEAST = 0.1, 5  # last part of a run, which is checked for creep, and least number of samples in it
+_STEADY = 0.1  # of a velocity: largest change there
+_LOADED = 0.01, 0.96  # of the level of friction: below, the joint rests; above, it slides
 
 
 def remarks(
     setup: Setup, observer: Observer, of: Observed, t: np.ndarray, samples: np.ndarray, power: dict[str, np.ndarray]
 ) -> tuple[Remark, ...]:
-    """All remarks on a run, chatter first.
+    """Return the remarks on the steps of a run, chatter first.
 
     Args:
-        setup: What ran.
-        observer: Closed, at the end of the run.
-        of: What it observed.
+        setup: The setup of the run.
+        observer: Its observer, closed at the end of the run.
+        of: Its observations.
         t: Times of its samples, (m,), in [s].
-        samples: q, v and u beside each other, (m, 3n).
-        power: Of each source, (m,), in [W].
+        samples: q, v and u side by side, (m, 3n).
+        power: Power of each source, (m,), in [W].
     """
     units, n = units_of(setup.plant.dynamics), len(setup.q0)
     v = samples[:, n : 2 * n]
@@ -62,7 +62,7 @@ def remarks(
 
 
 def of_reference(setup: Setup, t: np.ndarray, extremes: np.ndarray, units: Units) -> Iterator[Remark]:
-    """Remarks on the reference of a run, with extremes (3, 2, n) of its steps and samples at times t (m,)."""
+    """Yield remarks on the reference of a run, with extremes (3, 2, n) of its steps and samples at times t (m,)."""
     yield from (remark for remark, _ in jumps(setup, setup.q0[None], setup.v0[None], units))
     yield from held(setup, extremes, t, units)
 
@@ -71,36 +71,38 @@ def of_steps(
     names: tuple[str, ...], units: Units, visits: dict[Level, Visit], episodes: dict[int, Episode],
     remedy: Callable[[Episode], Facts], instants: int = 0,
 ) -> list[Remark]:  # fmt: skip
-    """Remarks on what was observed of a run: chatter, then levels.
+    """Return remarks on the observations of a run: chatter, then levels.
 
     Args:
-        names: Of the joints.
-        units: As of `units_of`.
-        visits: By level.
-        episodes: Of chatter, by joint.
-        remedy: Returns the facts that its remedy depends on.
-        instants: As of `Observed`.
+        names: Names of the joints.
+        units: Units of the joints, see `units_of`.
+        visits: Visits by level.
+        episodes: Episodes of chatter, by joint.
+        remedy: Function of an episode that returns the facts of its remedy.
+        instants: See `Observed`.
     """
-    found = [*_chatter(names, units, episodes, remedy)]
+    remarks = [*_chatter(names, units, episodes, remedy)]
     for kind in KINDS:
         of_kind = {level: visit for level, visit in visits.items() if level.kind is kind}
-        found += _passed(names, units, of_kind, instants)
-    return found
+        remarks += _passed(names, units, of_kind, instants)
+    return remarks
 
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
-    """Effects declared dissipative with τᵀv > 0 at a sample, by more than rounding."""
+    """Yield effects declared dissipative with τᵀv > 0 at a sample, by more than rounding."""
     working = [force for force in setup.plant.forces if not isinstance(force, Conservative)]
-    for force, (name, P) in zip(working, list(power.items())[1:], strict=False):  # behind the control, as of `sources`
-        takes = isinstance(force, Dissipative) and not isinstance(force, Stateful)  # what stores may give back
-        if not takes or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
+    for force, (name, P) in zip(working, list(power.items())[1:], strict=False):  # after the control, see `sources`
+        dissipates = isinstance(force, Dissipative) and not isinstance(
+            force, Stateful
+        )  # effects with states may return stored energy
+        if not dissipates or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
             continue
         at = int(np.nanargmax(P))
         yield Remark(RemarkKind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0)
 
 
 def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Iterator[Remark]:
-    """Joints that creep at the end of a run: regularised friction f moves them by v = v_s artanh(τ / f) if τ < f."""
+    """Yield joints that creep at the end of a run: with regularised friction f, v = v_s artanh(τ / f) if τ < f."""
     late = t >= t[-1] - _LAST * setup.duration_s
     if late.sum() < _LEAST:
         return
@@ -122,24 +124,22 @@ def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Itera
             yield Remark(RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, facts=facts)
 
 
-def units_of(dynamics: Any) -> Units:
-    """Units of q, v and u of each joint."""
-    robot: Any = getattr(dynamics, "robot", dynamics)
-    types = robot.joint_types if isinstance(robot, Robot) else (None,) * dynamics.n
-    return [(unit("q", each), unit("v", each), unit("u", each)) for each in types]
+def units_of(dynamics: Dynamics) -> Units:
+    """Return the units of q, v and u of each joint."""
+    return [(unit("q", kind), unit("v", kind), unit("u", kind)) for kind in joint_types_of(dynamics)]
 
 
 def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], instants: int) -> Iterator[Remark]:
-    """Levels passed, both sides of a limit as one."""
+    """Yield the levels passed, both sides of a limit as one."""
     n = len(units)
     rows: dict[int, list[tuple[Level, Visit]]] = {}
-    for level, visit in sorted(visits.items(), key=lambda each: each[1].start):
+    for level, visit in sorted(visits.items(), key=lambda pair: pair[1].start):
         rows.setdefault(level.row, []).append((level, visit))
     for row, both in rows.items():
         quantity, joint = divmod(row, n)
-        level, most = max(both, key=lambda each: abs(each[1].value - each[0].limit))
+        level, most = max(both, key=lambda pair: abs(pair[1].value - pair[0].limit))
         start = min(x.start for _, x in both)
-        duration = sum({level.limit: x.duration for level, x in both}.values())  # a limit of 0 is both sides of one
+        duration = sum({level.limit: x.duration for level, x in both}.values())  # both sides of a limit of 0 are one
         facts: dict[str, float | str] = {"unit": units[joint][quantity]}
         if QUANTITIES[quantity] == "u" and instants:
             facts["instants"] = instants
@@ -159,7 +159,7 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], in
 def _chatter(
     names: tuple[str, ...], units: Units, episodes: dict[int, Episode], remedy: Callable[[Episode], Facts]
 ) -> Iterator[Remark]:
-    for joint, episode in sorted(episodes.items(), key=lambda each: -each[1].amplitude):
+    for joint, episode in sorted(episodes.items(), key=lambda pair: -pair[1].amplitude):
         yield Remark(
             RemarkKind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
             None, facts={**remedy(episode), "unit": units[joint][2]},
@@ -167,10 +167,10 @@ def _chatter(
 
 
 def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], Facts]:
-    """Return a function of an episode of chatter that returns what its remedy depends on.
+    """Return a function of an episode of chatter that returns the facts of its remedy.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         t: Times of samples, (m,), in [s].
         q: Positions there, (m, n).
     """
@@ -183,7 +183,7 @@ def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], F
 
 
 def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> Facts:
-    """Return the period and, where it explains a chatter, the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times T."""
+    """Return the period and, if it explains a chatter, the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times T."""
     general: Facts = {"period_s": period}
     controller = setup.controller.controller if isinstance(setup.controller, Loop) else setup.controller
     assert controller is not None
@@ -199,17 +199,17 @@ def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> Facts:
     return {"ratio": ratio, "longest_s": period / ratio} if 1 < ratio < np.inf else general
 
 
-def _of_sensors(controller: Any) -> tuple[str, ...]:
-    """Blocks of the measurement of a loop that change from tick to tick by themselves, each once."""
+def _of_sensors(controller: Controller | None) -> tuple[str, ...]:
+    """Return the kinds of blocks in the measurement of a loop that make it change from tick to tick."""
     blocks = (*controller.position, *controller.velocity) if isinstance(controller, Loop) else ()
     kinds = {Quantisation: "quantisation", Noise: "noise"}
-    return tuple(dict.fromkeys(name for each in blocks for kind, name in kinds.items() if isinstance(each, kind)))
+    return tuple(dict.fromkeys(name for block in blocks for kind, name in kinds.items() if isinstance(block, kind)))
 
 
 def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: Units) -> Iterator[Remark]:
-    """Where q, v or u left the hull of the samples around it by a good part of its range; the worst for each joint."""
+    """Yield the worst excess of q, v or u of each joint over neighbouring samples, if large relative to the range."""
     edges, low, high = observer.windows
-    every = not setup.record_period_s and not setup.integrator.controls_error
+    every = not setup.record_every_s and not setup.method.controls_error
     if every or not len(low) or not len(t):
         return
     spacing = 1e-9 * (t[-1] - t[0])

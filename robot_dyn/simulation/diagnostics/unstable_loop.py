@@ -3,8 +3,8 @@
     sampled      δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} without sampling
     continuous   δx' = J δx:   max Re λ(J) > 0, and more than twice as fast as with the actuation held
 
-Slow growth may end before it shows. It explains a divergence at t if deviations grow by more than 1e3 until t: shorter
-steps follow such growth more closely, and do not end it, so that the advice is then about the loop.
+Slow growth may end before it shows. Growth explains a divergence at t if deviations grow by more than 1e3 until t.
+Shorter steps follow such growth more closely and do not end it, so the remedy concerns the loop.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ def unstable(
     """Yield a remark if the loop is unstable about the start, the middle or the end of a run, where states are finite.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         t: Times of its samples, (m,), in [s].
         y: Its states there, (m, size).
         runs_away: True if the run diverged or reached an implausible speed. A continuous loop is examined only then:
-            deviations may grow for a while along a motion that is as it should be.
+            deviations may grow for a while along a correct motion.
         remedies: True to search for the period or the gains that are stable, which takes most of the time.
         end: Time reached, in [s]; None for the last finite sample, or for the whole run if there is one sample only.
     """
@@ -50,7 +50,7 @@ def unstable(
     rows = sorted({int(k) for k in finite[[0, len(finite) // 2, -1]]}) if len(finite) else []
     if end is None:
         end = float(t[finite[-1]]) if len(t) > 1 and len(finite) else setup.duration_s
-    for k in rows:  # the first of them: later ones may be far out
+    for k in rows:  # only the first unstable one is reported: later states may be far out
         if growing := growing_loop(setup, float(t[k]), y[k]):
             yield growing.remark(setup, remedies, end)
             return
@@ -107,14 +107,14 @@ class GrowingLoop(NamedTuple):
 def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
     """Return the loop about a state y of a run if deviations grow there because of the control; otherwise None.
 
-    Where they grow without it too, as those of an arm that falls, it must make them grow twice as fast. "Without it" is
-    for a sampled loop the same control at all times, for a continuous one the actuation held.
+    If they grow without it too, for example for an arm that falls, it must make them grow twice as fast. "Without it"
+    means continuous control for a sampled loop, and constant actuation for a continuous loop.
     """
     controller, equation, n = setup.controller, setup.equation, setup.plant.dynamics.n
     motion = equation.equation_of_motion
     if controller is None or equation.canonical:
         return None
-    if motion.payloads or any(drive.coupled for drive in motion.drives.values()):  # no one linearisation holds
+    if motion.payloads or any(drive.coupled for drive in motion.drives.values()):  # no single linearisation is valid
         return None
     sampled, period = equation.sampled, controller.period_s
     size = controller.at_period(0.0).state_size
@@ -143,7 +143,7 @@ def _joint(deviation: np.ndarray, n: int, time_s: float) -> int:
 
 
 def _gains(setup: Setup, joint: int) -> dict[str, float | str]:
-    """Return the gains of a joint, such as "kp = 2e+04 N m/rad"; nothing for a law that declares none."""
+    """Return the gains of a joint, for example "kp = 2e+04 N m/rad"; empty for a law that declares none."""
     law, n = setup.controller, setup.plant.dynamics.n
     units = {name: gain.unit for name, gain in declared(type(law)).items() if name in _GAINS}
     values = {name: np.broadcast_to(getattr(law, name), (n,))[joint] for name in units}
@@ -152,7 +152,7 @@ def _gains(setup: Setup, joint: int) -> dict[str, float | str]:
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
-    """Return the outcome of a run; if a remark on its step or loop explains its divergence, that is its reason."""
+    """Return the outcome of a run; a remark on its step or loop that explains its divergence becomes the reason."""
     if outcome.ending is not Ending.DIVERGED:
         return outcome
     for remark in remarks:
@@ -167,5 +167,5 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
 
 
 def _because(reason: Reason, t: float, remark: Remark) -> Outcome:
-    """Return the outcome of a run that a remark explains."""
+    """Return the outcome of a run whose divergence a remark explains."""
     return Outcome(reason, t, remark.joint, dict(remark.fields))

@@ -15,10 +15,14 @@ import numpy as np
 
 from robot_dyn.effects.effect import numbered
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.sentences import Part, sentence
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
+_FASTEST = "the fastest motion {motion} with {rate_per_s:.3g} per second, of joint {moving_joint!r}, by "
+MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "nothing acts back on the motion of {moving_joint!r}"
+"""The sentence about the fastest motion, from `Fastest.facts`."""
 
 
 @final
@@ -41,13 +45,17 @@ class Fastest:
         """Whether it decays more than it oscillates."""
         return -self.eigenvalue.real > abs(self.eigenvalue.imag)
 
-    def __str__(self) -> str:
+    @property
+    def facts(self) -> dict[str, float | str]:
+        """The facts of `MOTION`: "decays" or "changes", |λ| in [1/s], joint and, unless it is the bodies, source."""
         if self.eigenvalue == 0:
-            return "nothing acts back on the motion"
-        how = "decays" if self.decays else "changes"
-        by = self.source if self.source == BODIES else repr(self.source)
-        rate = float(f"{abs(self.eigenvalue):.2g}")
-        return f"the fastest motion {how} with {rate:g} per second, of joint {self.joint!r}, by {by}"
+            return {"moving_joint": self.joint}
+        facts: dict[str, float | str] = {"motion": "decays" if self.decays else "changes", "moving_joint": self.joint}
+        facts["rate_per_s"] = abs(self.eigenvalue)
+        return facts if self.source == BODIES else facts | {"source": self.source}
+
+    def __str__(self) -> str:
+        return sentence((MOTION,), self.facts)
 
 
 def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:

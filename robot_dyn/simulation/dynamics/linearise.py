@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from robot_dyn.effects.effect import Bound, numbered
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
+from robot_dyn.effects.missing_time import MISSING_TIME
 from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.answer import Answer, Block, Table
@@ -45,7 +46,7 @@ class Linearisation(Answer, Value):
         v: Velocity, shape (n,), in [rad/s] or [m/s].
         z: States of effects, shape (m − 2 n,).
         u: Actuation, shape (n,), in [N m] or [N].
-        t: Time, in [s].
+        t: Time, in [s]; None if it was not passed.
     """
 
     A: np.ndarray
@@ -56,7 +57,7 @@ class Linearisation(Answer, Value):
     v: np.ndarray
     z: np.ndarray
     u: np.ndarray
-    t: float
+    t: float | None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -90,7 +91,7 @@ def linearise(
     u: ArrayLike | None = None,
     *,
     z: ArrayLike | None = None,
-    t: float = 0.0,
+    t: float | None = None,
 ) -> Linearisation:
     """Compute A and B of d/dt δx = A δx + B δu about one state, x = (q, v, z).
 
@@ -102,7 +103,7 @@ def linearise(
             state at rest is an equilibrium.
         z: States of the effects that have some, in the order of the plant; by default those at which ż = 0. States
             that nothing drives at this q and v keep their value at the start of a run, such as bristles at rest.
-        t: Time, in [s].
+        t: Time, in [s]; required if an effect depends on the time.
 
     Returns:
         A, shape (m, m), and B, shape (m, n), with the names of the entries of x and u and the state; shown as the
@@ -113,9 +114,10 @@ def linearise(
             rates 0 where they are not given.
     """
     plant = (plant if isinstance(plant, Plant) else Plant(plant)).at(t)
+    time = MISSING_TIME if t is None else float(t)
     names, n = plant.dynamics.joint_names, plant.dynamics.n
     q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
-    rates = _Rates(_sliding(plant, q, v).equation_of_motion, t)
+    rates = _Rates(_sliding(plant, q, v).equation_of_motion, time)
     size = rates.equation.state_size
     x = np.concatenate([q, v, rates.equation.start(q, v), np.zeros(n)])
     unknown = np.zeros(len(x), bool)
@@ -124,7 +126,7 @@ def linearise(
     else:
         x[2 * n : 2 * n + size] = numbers("z", z, (size,))
     if u is None:
-        torque = sum(rates.equation.torques(t, q, v, (n,)), start=np.zeros(n))
+        torque = sum(rates.equation.torques(time, q, v, (n,)), start=np.zeros(n))
         x[-n:] = rates.equation.dynamics.inverse_dynamics(q, v, np.zeros(n)) - torque
         unknown[-n:] = True
     else:
@@ -139,7 +141,7 @@ def linearise(
     A, B = np.zeros((2 * n + size, 2 * n + size)), np.zeros((2 * n + size, n))
     A[:n, n : 2 * n], A[n:], B[n:] = np.eye(n), slopes.values[:, :-n], slopes.values[:, -n:]
     q, v, z, u = rates.parts(x)
-    return Linearisation(A, B, rates.state_names, rates.input_names, q=q, v=v, z=z, u=u, t=float(t))
+    return Linearisation(A, B, rates.state_names, rates.input_names, q=q, v=v, z=z, u=u, t=None if t is None else time)
 
 
 @final

@@ -66,7 +66,7 @@ def interpreted_engine(setup: Setup, why: str = "", most: float = inf) -> Interp
         why: The reason for this engine, in its label.
         most: Evaluations after which another engine is to be chosen.
     """
-    reasons = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
+    reasons = [why] * bool(why) + ["Jacobian by differences"] * setup.method.needs_jacobian
     label = f"interpreted ({'; '.join(reasons)})" if reasons else "interpreted"
     return Interpreted(setup.equation, label, most)
 

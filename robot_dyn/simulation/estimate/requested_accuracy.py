@@ -1,4 +1,4 @@
-"""A run to a requested accuracy: the tolerance bounds the error per step; the error of the run is estimated.
+"""Runs with a requested accuracy: the tolerance bounds the error per step; the error of the run is estimated.
 
     e = c · tol,   c from a pilot run at a loose tolerance
 
@@ -27,10 +27,7 @@ from robot_dyn.simulation.setup.setup import Setup
 
 _AIM = 0.3  # of the requested error
 _TRUSTED = 0.5  # of the requested error: at a loose tolerance, the estimate may be only this fraction of the true error
-_LOOSE = {
-    EXPLICIT: 0.75,
-    STIFF: 0.5,
-}  # tolerance of the pilot run, as a power of the requested error; fast motion has decayed
+_LOOSE = {EXPLICIT: 0.75, STIFF: 0.5}  # power of the requested error: tolerance of the pilot run
 _LOOSEST = 1e-3
 _ATOL = 0.01  # ratio to rtol
 _TRIES = 4  # maximum number of tolerances tried
@@ -93,7 +90,7 @@ def trials(setup: Setup, requested: float) -> Generator[Setup, Trajectory, Traje
             break
         factor = _AIM * requested / error if isfinite(error) else 1e-2
         rtol = max(least, min(_LOOSEST, rtol * (min(factor, _LAST) if k == _TRIES - 2 else factor)))
-    best = min(tried, key=lambda each: each.error)
+    best = min(tried, key=lambda trial: trial.error)
     if best.error <= requested:
         return _achieved(best, requested, spent)
     raise AccuracyError(_refusal(best, requested, tried[-1].rtol), best.error)
@@ -103,11 +100,11 @@ def _at(
     setup: Setup, method: str, rtol: float, requested: float
 ) -> Generator[Setup, Trajectory, tuple[Trajectory, int]]:
     """Return the run at a tolerance, by the cheaper method if stability limits explicit steps; and the evaluations."""
-    trial = yield replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol))
+    trial = yield replace(setup, method=Adaptive(method, rtol, _ATOL * rtol))
     if method != AUTO or trial.statistics.method != EXPLICIT or setup.equation.sampled or not _stable_at_most(trial):
         return trial, _in_all(trial)
-    other = yield replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol))
-    return min((trial, other), key=lambda each: _predicted(each, requested)), _in_all(trial) + _in_all(other)
+    other = yield replace(setup, method=Adaptive(STIFF, rtol, _ATOL * rtol))
+    return min((trial, other), key=lambda run: _predicted(run, requested)), _in_all(trial) + _in_all(other)
 
 
 class _Try(NamedTuple):
@@ -122,14 +119,14 @@ def _in_each_segment(setup: Setup, requested: float) -> Generator[Setup, Traject
     """Return the run of one RK4 step between ticks of sampled control, if accurate enough; and the evaluations."""
     if not setup.equation.sampled or len(setup.segments) < _MANY:
         return None, 0
-    trial = yield replace(setup, integrator=RK4, step_s=setup.duration_s)
+    trial = yield replace(setup, method=RK4, step_s=setup.duration_s)
     error, spent = _resolved(trial), _in_all(trial)
     good = trial.outcome.ending is Ending.FINISHED and error <= _TRUSTED * requested
     return (_achieved(_Try(error, 0.0, trial), requested, spent) if good else None), spent
 
 
 def _stiff(setup: Setup) -> bool:
-    """Whether the fastest decay at the start would require many explicit steps."""
+    """Return True if the fastest decay at the start would require many explicit steps."""
     if setup.equation.sampled:
         return False
     equation = setup.equation.in_a_mode
@@ -141,21 +138,22 @@ def _stiff(setup: Setup) -> bool:
 
 
 def _stable_at_most(trial: Trajectory) -> bool:
-    """Whether stability limits the steps."""
-    return any(each.kind is RemarkKind.STIFF for each in trial.remarks)
+    """Return True if stability limits the steps."""
+    return any(remark.kind is RemarkKind.STIFF for remark in trial.remarks)
 
 
 def _decides(setup: Setup, trial: Trajectory) -> bool:
-    """Whether the tolerance, rather than stability, ticks, switches or events, determines the steps."""
+    """Return True if the tolerance, rather than stability, ticks, switches or events, determines the steps."""
     return not _stable_at_most(trial) and trial.statistics.steps > _FEW * (len(setup.segments) + len(trial.events))
 
 
 def _in_all(trial: Trajectory) -> int:
+    """Return the evaluations of a run and its companions."""
     return trial.statistics.evaluations + trial.statistics.companion_evaluations
 
 
 def _predicted(trial: Trajectory, requested: float) -> float:
-    """Predicted cost, in evaluations, of a run by the same method with the requested error."""
+    """Return the predicted evaluations of a run by the same method with the requested error."""
     if trial.outcome.ending is not Ending.FINISHED:
         return inf
     name, factor = trial.statistics.method, _resolved(trial) / (_AIM * requested)
@@ -163,13 +161,13 @@ def _predicted(trial: Trajectory, requested: float) -> float:
 
 
 def _resolved(trial: Trajectory) -> float:
-    """The estimated error of a run; inf if the estimate is not valid to the end."""
+    """Return the estimated error of a run; inf if the estimate is not valid to the end."""
     error = trial.error
     return inf if error is None else error.largest
 
 
 def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:
-    """The chosen run with the evaluations spent in all, and those for 10 and 0.1 times the accuracy by e = O(hᵖ)."""
+    """Return the chosen run with the total of evaluations, and those for 10 and 0.1 times the accuracy, e = O(hᵖ)."""
     trial, s = chosen.trial, chosen.trial.statistics
     factor = 10 ** (1 / _ORDER[s.method])
     return replace(
@@ -183,8 +181,10 @@ def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:
 
 def _refusal(best: _Try, requested: float, rtol: float) -> str:
     """Return why the best run misses the requested error, with tolerances down to `rtol`, and the remedy."""
-    why = "" if best.trial.error is None else best.trial.error.note.partition("; take ")[0]  # its remedy is of one run
-    if not why:
+    doubt = None if best.trial.error is None else best.trial.error.ends_early
+    if doubt is not None:
+        why = doubt.text  # its remedy is for a single run
+    else:
         method = best.trial.statistics.method
         least = f"{method}'s least tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
         why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"

@@ -1,4 +1,4 @@
-"""What is observed at every step of a run, whatever is recorded.
+"""Observations at every step of a run, independent of its record.
 
 - `observation`, `chatter`: extremes, time past levels, and reversals of the actuation, in plain functions for the loops
 - `observer`: the columns of one run, and their extremes in windows of time

@@ -1,10 +1,10 @@
 """Chatter: actuation that reverses at every tick, (u⁺ − u)(u − u⁻) < 0 many times in a row.
 
 Sampled damping chatters if its gain is too large for the period: v⁺ ≈ (1 − M⁻¹ kd T) v changes its sign at each tick
-when an eigenvalue of M⁻¹ kd T is above 1, and grows when it is above 2. [Åström, Wittenmark, Computer-Controlled
-Systems, 3rd ed., 1997, ch. 2]
+if an eigenvalue of M⁻¹ kd T is above 1, and grows if it is above 2. [Åström, Wittenmark, Computer-Controlled Systems,
+3rd ed., 1997, ch. 2]
 
-Plain functions of arrays (n, W) over joints and runs, since both time loops call them at each tick.
+Plain functions of arrays (n, W) over joints and runs; both time loops call them at each tick.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
 
-_REVERSALS = 10  # in a row, at least; well-sampled motion has fewer
+_REVERSALS = 10  # least number in a row; well-sampled motion has fewer
 _PART = 0.02  # of the joint's largest actuation so far: smaller changes are noise
 _LEAST = 1e-6  # of the largest actuation of any joint so far
 _OTHER = 10.0  # ratio of amplitudes above which the smaller of two episodes is not reported
@@ -43,7 +43,7 @@ class Chatter(NamedTuple):
         reversals: Reversals in a row so far, (n, W).
         streak: Start, duration and amplitude of the current row, (3, n, W).
         going: Number of runs with a current row, (n,).
-        episodes: Start, duration and amplitude of the reported episodes, (3, n, W); amplitude 0 where there is none.
+        episodes: Start, duration and amplitude of the reported episodes, (3, n, W); amplitude 0 for none.
     """
 
     t: Array
@@ -56,7 +56,7 @@ class Chatter(NamedTuple):
 
 
 def chatters_of(n: int, W: int, tiles: int) -> list[Chatter]:
-    """Empty records for `tiles` tiles of W runs, before their first tick."""
+    """Return empty records for `tiles` tiles of W runs, before their first tick."""
     t, ticks, going = np.zeros((tiles, 1)), np.zeros((tiles, 1), np.int64), np.zeros((tiles, n), np.int64)
     u, count = np.full((tiles, 3, n, W), np.nan), np.zeros((tiles, n, W), np.int64)
     streak, episodes = (np.zeros((tiles, 3, n, W)) for _ in range(2))
@@ -64,7 +64,7 @@ def chatters_of(n: int, W: int, tiles: int) -> list[Chatter]:
 
 
 def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
-    """Record a tick at t with the actuation u (n, W), which so far lay between low and high (n, W)."""
+    """Record a tick at t with the actuation u (n, W), whose extremes so far are low and high (n, W)."""
     k = of.ticks[0]
     before, middle, now = of.u[(k + 1) % 3], of.u[(k + 2) % 3], of.u[k % 3]
     copy(now, u)
@@ -79,17 +79,17 @@ def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
 
 
 def turns(before: Array, middle: Array, now: Array) -> bool:
-    """Whether the actuation (W,) of a joint reverses at the middle of three ticks in any run."""
-    found = False
+    """Return True if the actuation (W,) of a joint reverses at the middle of three ticks in any run."""
+    reverses = False
     for b in range(len(now)):
-        found |= (middle[b] - before[b]) * (now[b] - middle[b]) < 0.0
-    return found
+        reverses |= (middle[b] - before[b]) * (now[b] - middle[b]) < 0.0
+    return reverses
 
 
 def count(
     of: Chatter, j: int, b: int, t: float, change: float, next_change: float, low: Array, high: Array
 ) -> None:  # fmt: skip
-    """Count a reversal of joint j in run b at the tick before t; without one above the noise, end its row."""
+    """Count a reversal of joint j in run b at the tick before t; end its row if the change is noise."""
     largest = 0.0
     for i in range(len(low)):
         largest = max(largest, high[i], -low[i])
@@ -106,14 +106,14 @@ def count(
 
 
 def close(of: Chatter, j: int, b: int) -> None:
-    """End a row of reversals, which is an episode if it is long enough."""
+    """End a row of reversals; it is an episode if it is long enough."""
     if of.reversals[j, b] >= _REVERSALS:
-        duration, amplitude, known = of.streak[1, j, b], of.streak[2, j, b], of.episodes[2, j, b]
-        if amplitude > _OTHER * known:
+        duration, amplitude, largest = of.streak[1, j, b], of.streak[2, j, b], of.episodes[2, j, b]
+        if amplitude > _OTHER * largest:
             of.episodes[0, j, b], of.episodes[1, j, b], of.episodes[2, j, b] = of.streak[0, j, b], duration, amplitude
-        elif amplitude > known / _OTHER:
+        elif amplitude > largest / _OTHER:
             of.episodes[1, j, b] += duration
-            of.episodes[2, j, b] = max(known, amplitude)
+            of.episodes[2, j, b] = max(largest, amplitude)
     of.reversals[j, b] = 0
     of.going[j] -= 1
 

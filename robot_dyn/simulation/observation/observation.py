@@ -1,7 +1,7 @@
-"""What is observed of a run: extremes of q, v and u, the time beyond levels, and chatter.
+"""Observations of a run: extremes of q, v and u, the time beyond levels, and chatter.
 
-Plain functions of arrays over rows q, v, u and runs, (3n, W), as both time loops call them: for one run, or W in lock
-step. A run of which a number is nan has ended: nothing of it is taken.
+Plain functions of arrays over rows q, v, u and runs, (3n, W); both time loops call them, for one run or W in lock step.
+A run with a nan has ended and is ignored.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ _NONE: Mapping[int, Observation] = MappingProxyType({})
 
 
 class Observation(NamedTuple):
-    """What was observed so far.
+    """The observations of W runs so far.
 
     Attributes:
         low, high: Extremes, (3n, W).
-        inner: For each row the numbers between which no run is beyond a level, (2, 3n).
+        inner: Interval of each row in which no run is beyond a level, (2, 3n).
         first: Number of the first level of each row, and of levels, (3n + 1,).
-        sides, bounds: Of levels, (L,) and (L, W).
-        visits: Start, duration, time and value farthest beyond a level, (4, L, W); nan where a run never was.
-        chatter: Of u.
-        latest: The latest instant at which u was observed by itself, (1,), in [s].
+        sides, bounds: Sides and bounds of levels, (L,) and (L, W).
+        visits: Start, duration, time and value farthest beyond a level, (4, L, W); nan without a visit.
+        chatter: Chatter of u.
+        latest: The latest instant at which u was observed separately, (1,), in [s].
     """
 
     low: Array
@@ -48,23 +48,28 @@ class Observation(NamedTuple):
 
 
 def observation_of(start: Array, levels: GuardLevels) -> Observation:
-    """Of W runs that have not begun, from q, v, u at 0 s, (3n, W); nan where u is not known before the first tick."""
-    (of,) = observations_of(start, levels, 1)
-    return of
+    """Return the observation of W runs before their first step.
+
+    Args:
+        start: q, v, u at 0 s, (3n, W); nan for u if it is unknown before the first tick.
+        levels: Levels of the runs.
+    """
+    (observation,) = observations_of(start, levels, 1)
+    return observation
 
 
 def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Observation]:
-    """As of `observation_of`, of runs in tiles of one size, each of which is in lock step."""
+    """Return `observation_of` for each of some tiles, of the same number of runs in lock step."""
     rows, W = start.shape[0], start.shape[1] // tiles
 
     def tiled(x: Array) -> Array:
-        """(…, runs) as (tiles, …, W)."""
-        made = aligned((tiles, *x.shape[:-1], W))
-        made[...] = np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0)
-        return made
+        """Return an array (…, runs) as (tiles, …, W)."""
+        array = aligned((tiles, *x.shape[:-1], W))
+        array[...] = np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0)
+        return array
 
-    of = np.array([each.row for each in levels.levels], np.int64)
-    sides = np.array([float(each.side) for each in levels.levels])
+    of = np.array([level.row for level in levels.levels], np.int64)
+    sides = np.array([float(level.side) for level in levels.levels])
     bounds, up = tiled(levels.bounds), sides > 0
     inner = np.tile([[-np.inf], [np.inf]], (tiles, 1, rows))
     np.fmax.at(inner[:, 0].T, of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
@@ -84,20 +89,20 @@ def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Obser
     ]
 
 
-NOTHING = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # of no run: nothing is observed
+NOTHING = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # of no run
 
 
 def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Array, acted: bool) -> None:
-    """A step from `began` to t.
+    """Add a step to an observation.
 
     Args:
-        of: Becomes what was observed so far.
-        began: In [s].
-        t: In [s].
-        q: At its end, (n, W).
-        v: As q.
-        u: The actuation during it, as q.
-        acted: Whether the controller acted at its start.
+        of: The observation, which is updated.
+        began: Start of the step, in [s].
+        t: End of the step, in [s].
+        q: Positions at its end, (n, W).
+        v: Velocities at its end, (n, W).
+        u: Actuation during the step, (n, W).
+        acted: True if the controller acted at its start.
     """
     n = len(u)
     if acted:
@@ -107,13 +112,13 @@ def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Arra
 
 
 def observe_motion(of: Observation, began: float, t: float, q: Array, v: Array) -> None:
-    """A step from `began` to t, without its actuation; arguments as of `observe`."""
+    """Add a step from `began` to t without its actuation; see `observe` for the arguments."""
     look(of, 0, q, began, t, t)
     look(of, len(q), v, began, t, t)
 
 
 def observe_actuation(of: Observation, t: float, u: Array, acted: bool) -> None:
-    """The actuation (n, W) at an instant, which stands for the time since the one before."""
+    """Add the actuation (n, W) at an instant, which counts for the time since the previous one."""
     first = 2 * len(u)
     if acted:
         tick(of.chatter, of.latest[0], u, of.low[first:], of.high[first:])
@@ -122,7 +127,7 @@ def observe_actuation(of: Observation, t: float, u: Array, acted: bool) -> None:
 
 
 def look(of: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
-    """Rows x (n, W) from the `first` on, which hold at a time in the step."""
+    """Add rows x (n, W), from row `first` on, of a step from `began` to t; x is the value at the time `at`."""
     for j in range(len(x)):
         row = first + j
         if enclose(of.low[row], of.high[row], x[j], of.inner[0, row], of.inner[1, row]):
@@ -131,7 +136,7 @@ def look(of: Observation, first: int, x: Array, began: float, t: float, at: floa
 
 
 def visit(visits: Array, side: float, bounds: Array, x: Array, began: float, t: float, at: float) -> None:
-    """Add a step to the visits (4, W) of a level in the runs whose x is beyond it."""
+    """Add a step to the visits (4, W) of a level, for the runs whose x is beyond it."""
     for b in range(len(x)):
         if side * (x[b] - bounds[b]) > 0:
             if not visits[0, b] >= 0.0:
@@ -155,15 +160,15 @@ class Visit:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Observed(Value):
-    """What was observed of B runs of n joints from their start to their end.
+    """The observations of B runs of n joints from start to end.
 
     Attributes:
-        extremes: The least and the largest of q, v and u over all steps, (B, 3, 2, n); nan where u never was.
-        instants: Number of the instants at which, beside samples, u was observed, (B,); 0 where it was at every step.
+        extremes: The least and the largest of q, v and u over all steps, (B, 3, 2, n); nan if u was not observed.
+        instants: Number of instants, in addition to samples, at which u was observed, (B,); 0 for every step.
         levels: L levels, in the order of rows, with the limits of the first run that has them.
-        limits: As stated for each run, (B, L); nan where it has none.
-        visits: Start, duration, time and value farthest beyond each level, (B, L, 4); nan where a run never was.
-        episodes: Start, duration and amplitude of the chatter of each joint, (B, n, 3); of amplitude 0 without any.
+        limits: Stated limits of each run, (B, L); nan for none.
+        visits: Start, duration, time and value farthest beyond each level, (B, L, 4); nan without a visit.
+        episodes: Start, duration and amplitude of the chatter of each joint, (B, n, 3); amplitude 0 for none.
     """
 
     extremes: Annotated[np.ndarray, Layout(("B", 3, 2, "n"))]
@@ -180,38 +185,38 @@ class Observed(Value):
         return f"<Observed: {len(self.extremes)} runs, {len(self.levels)} levels>"
 
     def __getitem__(self, runs: slice) -> Observed:
-        """Of some of the runs."""
-        taken = {name: getattr(self, name)[runs] for name in ("extremes", "instants", "limits", "visits", "episodes")}
-        return replace(self, **taken)
+        """Return the observations of some of the runs."""
+        arrays = {name: getattr(self, name)[runs] for name in ("extremes", "instants", "limits", "visits", "episodes")}
+        return replace(self, **arrays)
 
     def visits_of(self, run: int) -> dict[Level, Visit]:
-        """By level."""
+        """Return the visits of a run by level."""
         return {
             replace(self.levels[k], limit=float(self.limits[run, k])): Visit(*self.visits[run, k].tolist())
             for k in np.flatnonzero(~np.isnan(self.visits[run, :, 0]))
         }
 
     def episodes_of(self, run: int) -> dict[int, Episode]:
-        """By joint."""
-        known = np.flatnonzero(self.episodes[run, :, 2])
-        return {int(joint): Episode(*self.episodes[run, joint].tolist()) for joint in known}
+        """Return the episodes of chatter of a run by joint."""
+        joints = np.flatnonzero(self.episodes[run, :, 2])
+        return {int(joint): Episode(*self.episodes[run, joint].tolist()) for joint in joints}
 
 
 def observed(
     parts: Iterable[Observation], levels: GuardLevels, again: Mapping[int, Observation] = _NONE, instants: int = 0
 ) -> Observed:
-    """What was observed of runs that have ended.
+    """Return the observations of runs that have ended.
 
     Args:
-        parts: Of all runs, those of one after those of the other.
-        levels: Of all runs.
-        again: Of single runs, by number, in place of what `parts` have.
-        instants: As of `Observed`, of the runs that are not made again.
+        parts: Observations of consecutive runs, which together are all.
+        levels: Levels of all runs.
+        again: Observations of repeated runs, by number; they replace those in `parts`.
+        instants: See `Observed`, for the runs that are not repeated.
     """
     parts = tuple(parts)
     for part in (*parts, *again.values()):
         close_all(part.chatter)
-    arrays = [np.concatenate(of, axis=-1) for of in zip(*map(_results, parts), strict=True)]
+    arrays = [np.concatenate(arrays, axis=-1) for arrays in zip(*map(_results, parts), strict=True)]
     for run, part in again.items():
         for array, x in zip(arrays, _results(part), strict=True):
             array[..., run] = x[..., 0]
@@ -224,5 +229,5 @@ def observed(
 
 
 def _results(of: Observation) -> tuple[Array, ...]:
-    """Low, high, visits and episodes."""
+    """Return low, high, visits and episodes."""
     return of.low, of.high, of.visits, of.chatter.episodes

@@ -1,7 +1,7 @@
-"""The observer of a run: sees t, q, v, u of every step, whatever is recorded, in memory that does not grow with it.
+"""The observer of a run: processes t, q, v, u of every step in memory that does not grow with the run.
 
-A time loop adds each step to `observation`, and writes a column for it into `columns`; when these are full, NumPy takes
-the extremes of windows of time from all of them at once.
+A time loop adds each step to `observation`, and writes a column for it into `columns`. When these are full, NumPy
+computes the extremes of windows of time from all of them at once.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from robot_dyn.simulation.observation.guard_levels import NO_LEVELS, GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observe, observed
 from robot_dyn.simulation.setup.setup import Setup
 
-CHUNK = 16384  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
-_PAD = 8  # so that the rows of a column lie in different sets of the processor's cache
-_WINDOW = 64  # columns whose extremes are kept as one, at first
-_FEW = 1000  # columns that may wait until it is asked what was observed
-_WINDOWS = 256  # at most so many are kept: beyond, two become one, and the next are twice as wide
+CHUNK = 16384  # columns processed together: with fewer, the overhead of NumPy calls dominates
+_PAD = 8  # puts the rows of a column into different sets of the processor's cache
+_WINDOW = 64  # columns in a window of time, at first
+_FEW = 1000  # number of columns that may remain unprocessed until the observations are read
+_WINDOWS = 256  # largest number of windows: beyond it, windows are merged in pairs, and later ones are twice as wide
 
 
 @final
 class Observer:
-    """What is seen of a run so far.
+    """The observer of a run in progress.
 
     Args:
-        start: The observation before the first step, which it goes on with.
-        levels: To be looked out for.
-        canonical: As below.
+        start: The observation before the first step, which is continued.
+        levels: Levels to observe.
+        canonical: True if steps are in (q, p).
 
     Attributes:
-        observation: What was observed so far.
-        columns: (1 + 3n, CHUNK and some): end of the step in [s]; q and v at its end; the actuation u during it.
+        observation: The observation so far.
+        columns: End of each step, in [s]; q and v at its end; actuation u during it; (1 + 3n, CHUNK + padding).
         filled: Number of columns written.
         seen: v and u of the latest evaluation of the equation of motion, (2n,).
-        canonical: Whether steps are in (q, p).
+        canonical: True if steps are in (q, p).
     """
 
     def __init__(self, start: Observation, levels: GuardLevels = NO_LEVELS, canonical: bool = False) -> None:
@@ -53,7 +53,7 @@ class Observer:
 
     @property
     def room(self) -> int:
-        """Columns that can still be written."""
+        """Number of free columns."""
         return self._chunk - self.filled
 
     @property
@@ -63,7 +63,14 @@ class Observer:
         return np.maximum(-self.observation.low[v, 0], self.observation.high[v, 0])
 
     def step(self, began: float, t: float, y: Array, acted: bool) -> None:
-        """One step to the state y at t; whether the controller `acted` at its start. Its actuation is `seen`."""
+        """Add a step from `began` to t that ends in the state y, with the actuation in `seen`.
+
+        Args:
+            began: Start of the step, in [s].
+            t: End of the step, in [s].
+            y: State at its end.
+            acted: True if the controller acted at its start.
+        """
         n, column = self.n, self.columns[:, self.filled]
         column[0], column[1 : 1 + 2 * n] = t, y[: 2 * n]
         column[1 + 2 * n :] = self.seen[n:]
@@ -75,7 +82,7 @@ class Observer:
         self.look()
 
     def look(self, end: bool = False) -> None:
-        """Look at the columns if there is no room for more, or at the end of the run."""
+        """Process the columns if no column is free, or at the end of the run."""
         if self.room and not (end and self.filled):
             return
         with np.errstate(all="ignore"):
@@ -83,23 +90,23 @@ class Observer:
         self.filled = 0
 
     def end(self) -> None:
-        """No step follows: look at the last ones, or if these are few keep them, without the room that was left."""
+        """End the run: process the last columns or, if these are few, store them without the free ones."""
         self.look(end=self.filled > _FEW)
         self.columns = self.columns[:, : self.filled].copy()
 
     def close(self) -> Observed:
-        """Return what was observed, the last steps included; threads may call it at one time."""
+        """Return the observations, including the last steps; threads may call it concurrently."""
         with self._closing:
             self.look(end=True)
         return observed([self.observation], self._levels)
 
     @property
     def windows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges (w + 1,) in [s] of windows of time, and the least and the largest (w, 3n) of q, v, u in each."""
+        """Edges of windows of time, (w + 1,), in [s], and the least and the largest q, v, u in each, (w, 3n)."""
         return self._edges, self._low, self._high
 
     def _windows(self, t: np.ndarray, x: np.ndarray) -> None:
-        """Keep the extremes of each window."""
+        """Store the extremes of each window."""
         width = min(self._width, len(t))
         whole = len(t) // width * width
         parts = x[:, :whole].reshape(len(x), -1, width)
@@ -115,7 +122,7 @@ class Observer:
             self._halve()
 
     def _halve(self) -> None:
-        """Two windows become one; from now on each is twice as wide, up to a whole chunk."""
+        """Merge windows in pairs; later ones are twice as wide, up to a whole chunk."""
         pairs = np.arange(0, len(self._low), 2)
         self._low, self._high = np.minimum.reduceat(self._low, pairs), np.maximum.reduceat(self._high, pairs)
         self._edges = np.append(self._edges[pairs], self._edges[-1])
@@ -137,9 +144,9 @@ def observed_start(setup: Setup) -> tuple[GuardLevels, Observation]:
 
 
 def _observation(setup: Setup, levels: GuardLevels) -> Observation:
-    """Return the observation of the start; nan for u if it is not known before the first tick."""
+    """Return the observation of the start; nan for u if it is unknown before the first tick."""
     equation, u = setup.equation, np.full(len(setup.q0), np.nan)
     if not equation.sampled:
-        with suppress(RobotDynError):  # the run will report it
+        with suppress(RobotDynError):  # the run reports it
             u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
     return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], levels)

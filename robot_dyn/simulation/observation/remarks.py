@@ -1,6 +1,6 @@
-"""Remarks on a run are rows of numbers and names; the one table of this file turns a row into a sentence.
+"""Remarks on a run: rows of numbers and names, and the table of their sentences.
 
-A kind more: a member of `RemarkKind`, a row of `_SENTENCES`, and a function that yields its remarks.
+To add a kind, add a member to `RemarkKind`, a row to `_SENTENCES`, and a function that yields its remarks.
 """
 
 from __future__ import annotations
@@ -8,32 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from string import Formatter
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
-Facts = Mapping[str, float | str]
-"""Numbers and names by name: the fields of a sentence."""
-
-Parts = tuple[str | tuple[str, ...], ...]
-"""The parts of a sentence, each a format string; of several in brackets, the first whose facts are all known."""
+from robot_dyn.foundations.sentences import Facts, Parts, prefixed, sentence
+from robot_dyn.simulation.dynamics.fastest_motion import MOTION
 
 _NAMED = 3  # joints in a line
 
 
-def sentence(parts: Parts, facts: Facts) -> str:
-    """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
-    chosen = ((part,) if isinstance(part, str) else part for part in parts)
-    complete = (next((text for text in texts if _fields(text) <= facts.keys()), "") for texts in chosen)
-    return "".join(text.format_map(facts) for text in complete)
-
-
-def _fields(text: str) -> set[str]:
-    """Return the names of the facts in a format string."""
-    return {name for _, name, _, _ in Formatter().parse(text) if name}
-
-
 class RemarkKind(StrEnum):
-    """What a remark is about."""
+    """Subject of a remark."""
 
     CHATTER = "chatter"
     EFFORT_REACHED = "effort_limit_reached"
@@ -52,7 +36,7 @@ class RemarkKind(StrEnum):
 
 
 class Sentence(NamedTuple):
-    """The parts of the line about a kind: its heading, the text of each remark, and the remedy for all."""
+    """The parts of the line about a kind: its heading, the text of each remark, and the common remedy."""
 
     heading: str
     text: Parts
@@ -69,8 +53,8 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         ("{joint} ±{value:.3g} {unit} from {start:.4g} s for {duration:.3g} s",),
         (
             (
-                "kd period_s / M is {ratio:.2g}, and reverses nothing: {blocks} of the measurement does; filter it, as "
-                "rd.control.LowPass does, or use less damping: a shorter period is no remedy",
+                "kd period_s / M is {ratio:.2g}, too small to reverse it: {blocks} of the measurement does; filter it "
+                "with rd.control.LowPass, or use less damping; a shorter period does not help",
                 "kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: use period_s below "
                 "{longest_s:.2g} s, or less damping",
                 "use a shorter period_s than {period_s:g} or less damping: it reverses where an eigenvalue of "
@@ -83,11 +67,11 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         "effort limit reached", ("{joint} " + _LASTED + " ({bound:.4g} {unit})", _SEEN)
     ),
     RemarkKind.STOP_REACHED: Sentence("joint stop reached", (_REACHED + ", " + _LASTED,)),
-    RemarkKind.BEYOND: Sentence("beyond the file's limits", (_REACHED, _SEEN), ("nothing in the plant enforces them",)),
+    RemarkKind.BEYOND: Sentence("beyond the file's limits", (_REACHED, _SEEN), ("the plant does not enforce them",)),
     RemarkKind.COARSE: Sentence(
         "record too coarse",
         ("{quantity} of {joint} {value:.4g} {unit} near {at:.4g} s (sampled: {limit:.4g})",),
-        ("use a shorter record_period_s",),
+        ("use a shorter record_every_s",),
     ),
     RemarkKind.GAINS: Sentence(
         "a dissipative effect does positive work",
@@ -97,7 +81,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.CREEPS: Sentence(
         "regularised friction creeps",
         ("{joint} at {value:.3g} {unit}, under {load:.3g} of {level:.3g} {unit_of_u}",),
-        ("dry_friction would hold what is below its level",),
+        ("dry_friction would hold a load below its level",),
     ),
     RemarkKind.ACCUMULATE: Sentence(
         "events accumulate",
@@ -106,12 +90,12 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     ),
     RemarkKind.STIFF: Sentence(
         "steps bounded by stability",
-        ("{motion}",),
-        (("made by {method} instead of {before}", "use integrator={method!r}"),),
+        (MOTION,),
+        (("made by {method} instead of {before}", "use method={method!r}"),),
     ),
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",
-        ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", "; {motion}"),
+        ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", prefixed("; ", MOTION)),
         ("use step_s={step_s}, or an implicit method",),
     ),
     RemarkKind.UNSTABLE: Sentence(
@@ -166,21 +150,21 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
 @final
 @dataclass(frozen=True)
 class Remark:
-    """One thing about one joint.
+    """An observation about one joint.
 
     Attributes:
-        kind: What it is about.
-        joint: Name of the joint; of the effect or the frame, if it is about one.
-        quantity: "q", "v", "u" or "power", of which value and limit are.
-        start: Time at which it began, in [s].
-        duration: How long it lasted in all, in [s].
-        at: Time at which the value was reached, in [s].
-        value: The extreme; the amplitude of a chatter, half of what the actuation changes between two ticks.
-        limit: Number that it compares with: a limit, or the extreme that the samples show; None for a chatter.
+        kind: Its subject.
+        joint: Name of the joint, or of the effect or frame that it concerns.
+        quantity: "q", "v", "u" or "power": the quantity of value and limit.
+        start: Time of its start, in [s].
+        duration: Total duration, in [s].
+        at: Time of the value, in [s].
+        value: The extreme; for chatter the amplitude, half of the change of actuation between two ticks.
+        limit: Number to compare with: a limit, or the extreme of the samples; None for chatter.
         facts: Further numbers and names of its sentence.
-        runs: Of a batch, the numbers of the runs that it is about; the first is the worst, whose values and text these
-            are. Empty for a single run.
-        looked: Of a batch, how many runs were looked at.
+        runs: Numbers of the affected runs of a batch, first the worst, whose values and text these are; empty for a
+            single run.
+        looked: Number of runs of the batch that were examined.
     """
 
     kind: RemarkKind
@@ -198,7 +182,7 @@ class Remark:
     @property
     def fields(self) -> Facts:
         """The numbers and names of its sentence."""
-        own: dict[str, Any] = {
+        own: dict[str, float | str] = {
             "joint": self.joint, "quantity": self.quantity, "start": self.start, "duration": self.duration,
             "at": self.at, "value": self.value,
         }  # fmt: skip
@@ -207,27 +191,23 @@ class Remark:
 
     @property
     def text(self) -> str:
-        """Joint, value and time in words."""
+        """Joint, value and time in a sentence."""
         return sentence(_SENTENCES[self.kind].text, self.fields)
 
     @property
     def remedy(self) -> str:
-        """A remedy, alike for all remarks of a kind in a run; empty if there is none."""
+        """The remedy, the same for all remarks of a kind in a run; empty if there is none."""
         return sentence(_SENTENCES[self.kind].remedy, self.fields)
 
 
 def line_parts(kind: RemarkKind) -> Parts:
     """Return the parts of the line about one remark of a kind."""
     heading, text, remedy = _SENTENCES[kind]
-    return (f"{heading}: ", *text, *(_after_semicolon(part) for part in remedy))
-
-
-def _after_semicolon(part: str | tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(f"; {text}" for text in ((part,) if isinstance(part, str) else part))
+    return (f"{heading}: ", *text, *(prefixed("; ", part) for part in remedy))
 
 
 def remark_lines(remarks: Iterable[Remark]) -> list[str]:
-    """Return a line for each kind: its joints, and a remedy."""
+    """Return a line for each kind, with its joints and a remedy."""
     by_kind: dict[RemarkKind, list[Remark]] = {}
     for remark in remarks:
         by_kind.setdefault(remark.kind, []).append(remark)
@@ -242,8 +222,8 @@ def _line(kind: RemarkKind, remarks: list[Remark]) -> str:
 
 
 def _of_runs(remark: Remark) -> str:
-    """Return the runs of a batch that a remark is about, as text; empty for a single run."""
+    """Return the runs of a batch that a remark affects, as text; empty for a single run."""
     if not remark.runs:
         return ""
-    count = f"{len(remark.runs)} of {remark.looked} runs" if remark.looked > 1 else "the only run looked at"
+    count = f"{len(remark.runs)} of {remark.looked} runs" if remark.looked > 1 else "the only run examined"
     return f" (run {remark.runs[0]}; {count})"

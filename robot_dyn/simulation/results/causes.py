@@ -1,6 +1,6 @@
 """The torque of each joint along a run by cause: τ = M a + C v + ∂V/∂q − Σ τ_effect at its samples.
 
-What effects exert follows from the states of the run, and is stored with it; the rest follows from its robot.
+The torques of effects are computed from the states of the run and stored with it; the others from its robot.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.results.samples import Columns
 
-_OPEN = 1e-9  # of the torques: far above rounding
+_OPEN = 1e-9  # relative to the torques: far above rounding
 
 
 def plant_of(plant: Plant, compiled: bool) -> Plant:
-    """The plant that a run had: machine code takes right angles of the file as exact."""
+    """Return the plant of a run: machine code makes right angles of the file exact."""
     robot = right_angles.robot_of(plant.dynamics) if compiled else None
     return plant if robot is None else replace(plant, dynamics=robot)
 
@@ -29,13 +29,13 @@ def plant_of(plant: Plant, compiled: bool) -> Plant:
 def effect_torques(
     plant: Plant, t: np.ndarray, columns: Columns, states: dict[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """Torque of each effect on the joints at k samples by name, (k, n), as of `exerted_torques`.
+    """Return the torque of each effect on the joints at k samples by name, (k, n), see `exerted_torques`.
 
     Args:
-        plant: Of the run.
-        t: Times, (k,).
+        plant: Plant of the run.
+        t: Times of the samples, (k,), in [s].
         columns: Quantities there.
-        states: Of each effect that has some, in their order.
+        states: States of the effects that have some, by name, in the order of the effects.
     """
     if not plant.forces and not plant.equation_of_motion.payloads:
         return {}
@@ -43,13 +43,13 @@ def effect_torques(
 
 
 def broken_away(plant: Plant, t: np.ndarray, columns: Columns, states: dict[str, np.ndarray]) -> np.ndarray:
-    """Accelerations at k samples, (k, n): where joints break away at the time of a sample, those after it.
+    """Return accelerations at k samples, (k, n): after breakaway, if a joint breaks away at the time of a sample.
 
-    The sample was recorded before, with these joints held, which no torque of the effects explains.
+    The sample is recorded before, with the joint at rest, which no torque of the effects explains.
     """
     q, v, a, u = columns[:4]
     exerted = effect_torques(plant, t, columns, states)
-    needed, total = plant.dynamics.inverse_dynamics(q, v, a, errors="nan"), sum(exerted.values(), start=0 * u) + u
+    needed, total = plant.dynamics.nan_rows.inverse_dynamics(q, v, a), sum(exerted.values(), start=0 * u) + u
     doubtful = np.abs(needed - total) > _OPEN * (np.abs(needed).max(axis=1) + np.abs(u).max(axis=1))[:, None]
     a, z = a.copy(), _stacked(states)
     for k in np.flatnonzero(doubtful.any(axis=1) & ((v == 0) & (a == 0)).any(axis=1)):
@@ -64,18 +64,18 @@ def _stacked(states: dict[str, np.ndarray]) -> np.ndarray | None:
 
 
 def causes_of(run: TrajectoryData) -> Causes:
-    """The causes of a run, as of `Trajectory.causes`.
+    """Return the causes of a run, see `Trajectory.causes`.
 
     Raises:
-        QueryError: If the run carries no robot, or not what is needed.
+        QueryError: If the run contains no robot, or lacks a quantity that is needed.
     """
     if run.effect_torques is None:
         raise QueryError(
-            "the run does not hold what its effects exerted, so its torque cannot be split by cause: simulate it again"
+            "the run contains no torques of its effects, so its torque cannot be split by cause: simulate it again"
             " with its error estimate (a run of rollouts with rd.simulate(runs.setup_of(i)))"
         )
     if np.isnan(run.a).all() or np.isnan(run.u).all():
-        raise QueryError("the run holds no accelerations or no actuation; simulate it with rd.simulate")
+        raise QueryError("the run contains no accelerations or no actuation; simulate it with rd.simulate")
     robot = robot_of(run)
     if "right_angles" in run.about:
         robot, _ = right_angles.completed(robot)

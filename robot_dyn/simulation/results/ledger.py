@@ -1,7 +1,7 @@
 """The energy ledger of a run: E(t) − E(0) = Σ W_k(t) + residual, with E = K + Σ potentials.
 
-A residual near zero is necessary for a run to be right, not sufficient: the error estimate is the figure of accuracy.
-Why one is not near zero is found by `imbalance`.
+A residual near zero is necessary for a correct run, not sufficient: the error estimate measures the accuracy.
+`diagnostics/imbalance.py` finds why a ledger does not close.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ import numpy as np
 
 from robot_dyn.foundations.store import Layout
 from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
-_OPEN = 1e-3  # a residual, as a part of the energy exchanged
-_ROUNDING = 1e-12  # of the energies, whose differences are the residual
-# Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
-# q, as a part of the motion; one that is far larger contradicts the estimate.
+_OPEN = 1e-3  # largest residual that closes, relative to the energy exchanged
+_ROUNDING = 1e-12  # of the energies whose difference is the residual
+# Residuals relative to the energy exchanged: over 150 random scenes they were at most 10 times the estimated error of
+# q relative to the motion. A far larger one contradicts the estimate.
 _CONTRADICTS = 100.0
 
 
@@ -29,11 +30,11 @@ class Ledger(Value):
 
     Attributes:
         kinetic: K.
-        potential: Of gravity and of the conservative effects.
-        work: Done up to each sample by the control and by each other effect, by name.
-        kinetic_peak: Largest K between the samples that is known.
-        stored: Of effects with states, by name: what these hold of the energy that their work took.
-        cause: Why it does not close, and what to do; empty if it closes, or the cause was not looked for.
+        potential: Potential energy of gravity and of the conservative effects.
+        work: Work done up to each sample by the control and by each other effect, by name.
+        kinetic_peak: Largest known K between the samples.
+        stored: Energy stored in effects with states, by name; their work includes it.
+        cause: Reason why the ledger does not close; None if it closes, or if the reason was not searched for.
     """
 
     kinetic: Annotated[np.ndarray, Layout(("m",), absent=True)]
@@ -41,7 +42,7 @@ class Ledger(Value):
     work: dict[str, Annotated[np.ndarray, Layout(("m",), absent=True)]]
     kinetic_peak: float = 0.0
     stored: dict[str, Annotated[np.ndarray, Layout(("m",))]] = field(default_factory=dict)
-    cause: str = ""
+    cause: Doubt | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -59,14 +60,14 @@ class Ledger(Value):
         return self.kinetic + self.potential
 
     @property
-    @np.errstate(all="ignore")  # a run that diverged may have energies that overflow
+    @np.errstate(all="ignore")  # energies of a run that diverged may overflow
     def residual(self) -> np.ndarray:
-        """E(t) − E(0) − Σ W_k(t): energy that nothing accounts for, the error of the run in energy."""
+        """E(t) − E(0) − Σ W_k(t): unexplained energy, the error of the run in energy."""
         return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
 
     @property
     def known(self) -> bool:
-        """Whether it was recorded: energies or work of rollouts may be nan throughout."""
+        """True if it was recorded: energies or work of rollouts may be nan throughout."""
         return not np.isnan(self.residual).all()
 
     @property
@@ -78,17 +79,17 @@ class Ledger(Value):
 
     @property
     def closes(self) -> bool:
-        """Whether at most a thousandth of the energy exchanged is unaccounted for, or rounding."""
+        """True if the residual is at most a thousandth of the energy exchanged, or rounding."""
         return self.rounded or not self.closure > _OPEN
 
     @property
     def rounded(self) -> bool:
-        """Whether the residual is rounding: at most 1e-12 of the energies and the work that are added up."""
+        """True if the residual is rounding: at most 1e-12 of the energies and the work that are added up."""
         return bool(largest(np.abs(self.residual)) <= self._rounding)
 
     @property
     def exchanges(self) -> bool:
-        """Whether energy was exchanged, beyond rounding of the energies."""
+        """True if energy was exchanged, beyond rounding of the energies."""
         return self.exchanged > self._rounding
 
     @property
@@ -98,18 +99,24 @@ class Ledger(Value):
 
     @property
     def closure(self) -> float:
-        """Largest residual, as a part of the energy exchanged; 0 if nothing moved."""
+        """Largest residual relative to the energy exchanged; 0 if nothing moved."""
         return largest(np.abs(self.residual)) / self.exchanged if self.exchanged > 0 else 0.0
 
 
 def largest(values: np.ndarray) -> float:
-    """The largest that is known; nan if none is, as in a run that ended before its first step."""
-    known = values[~np.isnan(values)]
-    return float(known.max()) if len(known) else float("nan")
+    """Return the largest value that is not nan; nan if all are, as in a run that ended before its first step."""
+    numbers = values[~np.isnan(values)]
+    return float(numbers.max()) if len(numbers) else float("nan")
 
 
 def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
-    """The text of `Trajectory.leak`, from the ledger, the estimated error and the samples q (m, n) of a run."""
+    """Return the text of `Trajectory.leak`.
+
+    Args:
+        ledger: The ledger of a run.
+        error: Its estimated error.
+        q: Positions at its samples, (m, n).
+    """
     if not ledger.closes:
         return f"it does not close: {ledger.cause or 'simulate it with its error estimate, which finds the cause'}"
     if ledger.rounded or error is None:
@@ -117,5 +124,7 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
     span = float(np.ptp(q, axis=0).max())
     if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.largest / span, _ROUNDING):
         return ""
-    why = ledger.cause or "do not trust the estimate, take a smaller step"
-    return f"it does not close as well as the estimated error of q implies: {why}"
+    doubt = "do not trust the estimate, " if ledger.cause is None or ledger.cause.is_of_steps else ""
+    return (
+        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'take a smaller step'}"
+    )

@@ -1,8 +1,8 @@
-"""The origin of a run: the texts from which its robot is built again, wherever the file is read.
+"""The origin of a run: texts from which its robot is rebuilt on any machine.
 
-A run file carries the URDF, findings on its file, the edits, the scene and the versions, so that a replay needs nothing
-else but meshes. These are found from the path of the URDF, which a file holds in a form that reveals nothing about the
-machine.
+A run file contains the URDF, findings on its file, the edits, the scene and the versions, so that a replay needs only
+the meshes in addition. Their place follows from the path of the URDF. A file stores it in a form that reveals nothing
+about the machine.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from robot_dyn.foundations.extras import version_of
 from robot_dyn.model.findings import reservations
 from robot_dyn.model.right_angles import written_out
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.setup.settings import settings_of
 from robot_dyn.simulation.setup.setup import Setup
@@ -31,8 +32,8 @@ from robot_dyn.simulation.setup.setup import Setup
 _LISTED = 4  # findings in a summary
 
 
-def origin(dynamics: Any) -> dict[str, str]:
-    """Where a run comes from, as texts: URDF, its path, edits and versions."""
+def origin(dynamics: Dynamics) -> dict[str, str]:
+    """Return the origin of a run as texts: URDF, its path, edits and versions."""
     robot = getattr(dynamics, "robot", dynamics)
     texts = {"versions": versions()}
     if isinstance(robot, Robot):
@@ -45,40 +46,40 @@ def origin(dynamics: Any) -> dict[str, str]:
 
 
 def edits_of_machine_code(setup: Setup) -> dict[str, str]:
-    """What machine code changes of a setup, as texts of a run: right angles of plant and controller's models."""
+    """Return the changes of machine code to a setup as texts of a run: right angles of plant and models."""
     edited_angles = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
     return {"right_angles": edited_angles} if edited_angles else {}
 
 
 def settings_text(setup: Setup) -> dict[str, str]:
-    """The settings of a run, as a text of it."""
+    """Return the settings of a run as a text of it."""
     return {"settings": json.dumps(settings_of(setup), ensure_ascii=False)}
 
 
 def packed(about: dict[str, str], folder: Path) -> dict[str, str]:
-    """The texts of a run as a file in `folder` stores them: without the name of the file that it was read from."""
+    """Return the texts of a run for a file in `folder`: without the name of the file it was read from."""
     about = {name: text for name, text in about.items() if name != "file"}
     return about | {"source": portable(about["source"], folder)} if "source" in about else about
 
 
 def unpacked(about: dict[str, str], file: Path) -> dict[str, str]:
-    """The texts of a run of a file, with the name of that file."""
+    """Return the texts of a run that was read from a file, with the name of that file."""
     about, folder = about | {"file": file.name}, file.parent
     if "source" not in about:
         return about
     path = Path(about["source"])
     with suppress(RuntimeError):  # no such home
         path = path.expanduser()
-    beside = folder.absolute() / path
-    if len(path.parts) == 1 and not beside.exists():  # the name alone of a file elsewhere
+    in_folder = folder.absolute() / path
+    if len(path.parts) == 1 and not in_folder.exists():  # only the name of a file elsewhere
         return about
-    return about | {"source": os.path.normpath(beside)}
+    return about | {"source": os.path.normpath(in_folder)}
 
 
 def portable(source: str, folder: Path) -> str:
-    """The path of a URDF from the folder of a run, or from the home folder (~); else its name alone.
+    """Return the path of a URDF from the folder of a run, or from the home folder (~); otherwise its name.
 
-    A robot of the catalog needs no more than its name: its meshes are found in the installed package.
+    The name is enough for a robot of the catalog, whose meshes are in the installed package.
     """
     path, folder, home = Path(source).resolve(), folder.resolve(), Path(os.path.expanduser("~")).resolve()
     if path in catalog.files():
@@ -93,23 +94,23 @@ def portable(source: str, folder: Path) -> str:
 
 
 def about_the_robot(run: RunData) -> Iterator[str]:
-    """What was estimated of a run's robot, and what was assumed or left out of its file: the first, and how many."""
+    """Yield the first estimates, assumptions and omissions of the robot's file as lines, and the number of the rest."""
     with suppress(DescriptionError):
-        found = reservations(_description(run))
-        yield from (f"robot: {shorten(each, 200)}" for each in found[:_LISTED])
-        if more := found[_LISTED:]:
+        findings = reservations(_description(run))
+        yield from (f"robot: {shorten(finding, 200)}" for finding in findings[:_LISTED])
+        if more := findings[_LISTED:]:
             yield f"robot: {len(more)} more findings on its file; rd.info lists them"
 
 
 def _description(run: RunData) -> Description:
-    """The robot's file, as the run carries it; DescriptionError if there is none."""
+    """Return the robot's file from the texts of the run; DescriptionError if there is none."""
     description = check(run.about.get("urdf", "").encode(), run.about.get("source", "the run's URDF"))
-    of_reading = filter(None, run.about.get("findings", "").split("\n"))  # which the URDF alone does not give again
+    of_reading = filter(None, run.about.get("findings", "").split("\n"))  # they cannot be found from the URDF alone
     return replace(description, findings=tuple(dict.fromkeys((*of_reading, *description.findings))))
 
 
 def joint_types(run: RunData) -> tuple[str | None, ...]:
-    """Types of the joints of a run, as of `Robot.joint_types`; None for each of a run without a URDF."""
+    """Return the types of the joints of a run, see `Robot.joint_types`; None for each joint without a URDF."""
     try:
         kinds = _description(run).joint_kinds
     except DescriptionError:
@@ -119,24 +120,24 @@ def joint_types(run: RunData) -> tuple[str | None, ...]:
 
 @cache  # reading the metadata of packages takes longer than a short run
 def versions() -> str:
-    """Versions of this library and of those that its numbers depend on."""
+    """Return the versions of this library and of the libraries that its numbers depend on."""
     return ", ".join(f"{name} {version_of(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))
 
 
 def robot_of(run: RunData) -> Robot:
-    """The robot of a run, from the texts it carries.
+    """Return the robot of a run, built from its texts.
 
     Raises:
         QueryError: If the run does not come from a URDF, or its texts do not fit together.
     """
     about = run.about
     if "urdf" not in about:
-        raise QueryError("the run carries no URDF, so there is no robot to show; simulate one that rd.load gives")
+        raise QueryError("the run contains no URDF, so there is no robot to show; simulate one that rd.load returns")
     robot = Robot(_description(run))
     try:
         robot = _edited(robot, json.loads(about["edits"]))
     except (KeyError, TypeError, ValueError):
-        raise QueryError("the edits that the run carries cannot be read; simulate again") from None
+        raise QueryError("the edits in the run cannot be read; simulate again") from None
     if robot.joint_names != run.joint_names:
         raise QueryError(
             f"the run's joints {', '.join(run.joint_names)} are not those of its URDF, {', '.join(robot.joint_names)};"
@@ -146,8 +147,8 @@ def robot_of(run: RunData) -> Robot:
 
 
 def _edited(robot: Robot, edits: Any) -> Robot:
-    """The robot with the edits of `Edits.as_json`, checked as a user's are; locks come last, they take joints away."""
-    payloads = [Payload(**each) for each in edits["payloads"]]
+    """Return the robot with the edits of `Edits.as_json`, checked as usual; locks come last, they remove joints."""
+    payloads = [Payload(**fields) for fields in edits["payloads"]]
     armature, lock = dict(edits["armature"]), dict(edits["lock"])
     links = {key: dict(edits[key]) for key in ("masses", "inertias") if edits.get(key)}
     free = robot.with_(

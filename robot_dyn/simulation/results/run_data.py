@@ -1,7 +1,7 @@
-"""The record of a run: one table of quantities, the fields that one run and many share, and those of one run.
+"""The record of a run: the table of quantities, the fields common to one run and many, and those of one run.
 
-A quantity that is added stands in SAMPLED and in the fields of `TrajectoryData`: files, tables, DataFrames, Datasets
-and exports have it from there. `derived.py` computes it.
+To add a quantity, add it to SAMPLED and to the fields of `TrajectoryData`, and compute it in `derived.py`. Files,
+tables, DataFrames, Datasets and exports then include it.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class SampledQuantity(Layout):
     """A quantity at the samples of a run; its layout is that of one run.
 
     Attributes:
-        unit: In SI units, or "q", "v", "a" or "u" for the unit of the joint.
-        title: Its name in words.
-        heading: Of its columns in tables; empty if it has none.
-        over: Name of its second axis, where that is not of joints.
+        unit: SI unit, or "q", "v", "a" or "u" for the unit of the joint.
+        title: Name in words.
+        heading: Heading of its columns in tables; empty if it has none.
+        over: Name of its second axis if that is not the joints.
     """
 
     unit: str = ""
@@ -63,8 +63,8 @@ SAMPLED: Mapping[str, SampledQuantity] = MappingProxyType(
         "u": SampledQuantity(_MN, absent=True, unit="u", title="actuation within its bounds", heading="u"),
         "desired": SampledQuantity(_MN, unit="q", title="desired position", heading="desired"),
         "desired_velocity": SampledQuantity(_MN, unit="v", title="desired velocity"),
-        "deviation": SampledQuantity(
-            ("m", ("n", 3)), unit="m", title="deviation from the desired motion", heading="deviation", over="axis"
+        "tracking_error": SampledQuantity(
+            ("m", ("n", 3)), unit="m", title="tracking error", heading="tracking error", over="axis"
         ),
         "at_stop": SampledQuantity(_MN, "bool", title="whether it is at or beyond a stop"),
         "effect_torques": SampledQuantity(_MN, absent=True, unit="u", title="torque of an effect"),
@@ -73,12 +73,12 @@ SAMPLED: Mapping[str, SampledQuantity] = MappingProxyType(
         "potential": SampledQuantity(_M, absent=True, unit="J", title="potential energy"),
         "work": SampledQuantity(_M, absent=True, unit="J", title="work"),
         "energy": SampledQuantity(_M, unit="J", title="kinetic and potential energy", heading="energy"),
-        "residual": SampledQuantity(_M, unit="J", title="energy that nothing accounts for", heading="residual"),
+        "residual": SampledQuantity(_M, unit="J", title="unexplained energy", heading="residual"),
         "controller_states": SampledQuantity(("m", "z"), heading="controller state"),
         "effect_states": SampledQuantity(("m", None), heading="state"),
     }
 )
-"""By name, in the order of tables; those without a unit have that of their effect."""
+"""Sampled quantities by name, in the order of tables; those without a unit have the unit of their effect."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -86,11 +86,11 @@ class RunData(Derived):
     """The record of a run at m samples, or of B runs, where all arrays except t have a leading axis B.
 
     Attributes:
-        joint_names: Of the n joints.
+        joint_names: Names of the n joints.
         t: Sample times, (m,), in [s].
         q, v, u: Positions, velocities and actuation, (m, n) or (B, m, n); None if not recorded.
         statistics: Steps, evaluations and times.
-        about: Texts that make it whole: URDF, edits, settings, versions.
+        about: Texts from which the run can be repeated: URDF, edits, settings, versions.
     """
 
     joint_names: tuple[str, ...]
@@ -106,22 +106,22 @@ class RunData(Derived):
 
     @property
     def summary(self) -> str:
-        """A few lines: how it ended, its accuracy and its cost."""
+        """A few lines: outcome, accuracy and cost."""
         raise NotImplementedError
 
     def _columns(self) -> Iterable[Column]:
-        """The columns of the table, with quantity, joint and unit; exports read it too."""
+        """Return the columns of the table, with quantity, joint and unit, for exports too."""
         raise NotImplementedError
 
     def _variables(self) -> Mapping[str, Variable]:
-        """Further variables of a Dataset."""
+        """Return further variables of a Dataset."""
         return {}
 
     def table(self) -> dict[str, np.ndarray]:
-        """The table as columns by quantity, joint and unit, such as `run.table()["q elbow_joint [rad]"]`.
+        """Return columns by quantity, joint and unit, for example `run.table()["q elbow_joint [rad]"]`.
 
-        A run has a row for each sample. Rollouts have a row for each run: swept parameters, start, end,
-        tracking error, the remarks; the rms of v and u over the samples up to the end, as far as they were recorded
+        A run has a row for each sample. Rollouts have a row for each run: varied parameters, start, end,
+        tracking error, the remarks; the rms of v and u over the samples up to the end, if they were recorded
         (`record=("q", "v", "u")` for u), and extremes of q, v and u over the steps, which need no record.
         """
         return by_heading(self._columns())
@@ -133,7 +133,7 @@ class RunData(Derived):
     def to_xarray(self) -> Any:
         """Return `table` as an `xarray.Dataset` over t or run, and joint, with units; MissingExtraError without xarray.
 
-        That of rollouts has all samples too, over run, t and joint.
+        The Dataset of rollouts contains all samples too, over run, t and joint.
         """
         return data_set(self._columns(), self.joint_names, attributes(self), self._variables())
 
@@ -142,14 +142,14 @@ class RunData(Derived):
 
 
 def taken(values: Any, part: slice) -> Any:
-    """The part of an array along its first axis, or of all arrays of a dictionary; None of None."""
+    """Return a part of an array along its first axis, or of all arrays of a dictionary; None for None."""
     if isinstance(values, dict):
         return {name: x[part] for name, x in values.items()}
     return None if values is None else values[part]
 
 
 def attributes(run: RunData) -> dict[str, str]:
-    """Attributes of a table: robot, settings, versions, and the summary without its times.
+    """Return the attributes of a table: robot, settings, versions, and the summary without its times.
 
     They contain no path of this machine.
     """
@@ -160,7 +160,7 @@ def attributes(run: RunData) -> dict[str, str]:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class TrajectoryData(RunData):
-    """The fields of one run, as `Trajectory` describes them."""
+    """The fields of one run; see `Trajectory`."""
 
     q: Annotated[np.ndarray, SAMPLED["q"]]
     v: Annotated[np.ndarray, SAMPLED["v"]]
@@ -169,7 +169,7 @@ class TrajectoryData(RunData):
     power: dict[str, Annotated[np.ndarray, SAMPLED["power"]]]
     ledger: Ledger
     desired: Annotated[np.ndarray, SAMPLED["desired"]] | None
-    deviation: Annotated[np.ndarray, SAMPLED["deviation"]] | None
+    tracking_error: Annotated[np.ndarray, SAMPLED["tracking_error"]] | None
     outcome: Outcome
     error: ErrorEstimate | None = field(default_factory=NoneType)
     wrenches: dict[str, Annotated[np.ndarray, Layout((None, 7))]] = field(default_factory=dict)
@@ -185,11 +185,11 @@ class TrajectoryData(RunData):
     desired_velocity: Annotated[np.ndarray, SAMPLED["desired_velocity"]] | None = field(default_factory=NoneType)
 
     @property
-    def tracking_error(self) -> float | None:
-        """Root mean square of the deviation over samples and joints or axes; None without a reference."""
-        return None if self.deviation is None else root_mean_square(self.deviation)
+    def rms_tracking_error(self) -> float | None:
+        """Root mean square of the tracking error over samples and joints or axes; None without a reference."""
+        return None if self.tracking_error is None else root_mean_square(self.tracking_error)
 
     @property
     def leak(self) -> str:
-        """Why the energy ledger casts doubt on the run; empty if it does not."""
+        """Text of the doubt that the energy ledger casts on the run; empty if there is none."""
         return leak(self.ledger, self.error, self.q)

@@ -18,7 +18,7 @@ from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import LONGEST_S
 
-FORMAT = 8
+FORMAT = 9
 RUN = FileKind("a run file", ".npz", b"PK\x03\x04")
 REMEDY = "write one with run.save('run.npz') or robot-dyn simulate … -o run.npz"
 
@@ -56,10 +56,10 @@ def _check(run: TrajectoryData, members: Found) -> None:
         raise StoreError("the times of member 'error/t' are not those of a run, or do not grow")
     if run.power.keys() != run.ledger.work.keys():
         raise StoreError("members of 'power' and of the ledger's 'work' have different names")
-    if run.desired is not None and run.deviation is not None and run.deviation.shape != run.desired.shape:
-        raise StoreError("members 'desired' and 'deviation' differ in shape")
-    if run.desired is None and run.deviation is not None and run.deviation.shape[1] != 3:
-        raise StoreError("member 'deviation' of joints needs 'desired', which is missing")
+    if run.desired is not None and run.tracking_error is not None and run.tracking_error.shape != run.desired.shape:
+        raise StoreError("members 'desired' and 'tracking_error' differ in shape")
+    if run.desired is None and run.tracking_error is not None and run.tracking_error.shape[1] != 3:
+        raise StoreError("member 'tracking_error' of joints needs 'desired', which is missing")
     if not are_times(np.array([run.outcome.t])):
         raise StoreError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
 

@@ -1,8 +1,8 @@
-"""What follows from the states of a run: acceleration, actuation, power, energy and tracking error of each sample.
+"""Quantities derived from the states of a run: acceleration, actuation, power, energy and tracking error.
 
     a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v,   E = K + Σ potentials
 
-The tracking error is √(mean over samples and joints of (q − q_d)²).
+The tracking error is √(mean over samples and joints of (q_d − q)²).
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, derived: np.n
     if equation.canonical:  # y holds the momentum, and y' its rate
         v = derived[:, :n]
         z = y[:, 2 * n : works]
-        a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
+        a = np.array([_acceleration(equation, *state) for state in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
     return Columns(q, v, a, u, y[:, works:], derived[:, works:m], derived[:, m + n :])
 
 
 def ledger(equation: StateEquation, record: Recording) -> Ledger:
-    """The energy ledger at the samples of a run."""
+    """Return the energy ledger at the samples of a run."""
     m, works = equation.size, equation.size - len(equation.sources)
-    E, work = record.made[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
+    E, work = record.sampled[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
     return Ledger(E[:, 0], E[:, 1], work, record.kinetic_peak, equation.stored(record.t, record.y))
 
 
@@ -67,21 +67,21 @@ def _acceleration(
 
 
 class Tracking(NamedTuple):
-    """Desired positions and velocities of the joints, (m, n); how far the joints, or the frame, are from the reference.
+    """Desired positions and velocities of the joints, (m, n), and the tracking error of joints or frame.
 
-    None where there is no such reference; `deviation` is (…, m, n) or (…, m, 3).
+    A quantity without a reference is None; `tracking_error` is (…, m, n) or (…, m, 3).
     """
 
     desired: np.ndarray | None = None
     desired_velocity: np.ndarray | None = None
-    deviation: np.ndarray | None = None
+    tracking_error: np.ndarray | None = None
 
 
 def tracking_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> Tracking:
-    """What a controller is to follow, and how far from it the motion is.
+    """Return the reference of a controller, and the deviation of the motion from it.
 
     Args:
-        setup: Of the controller.
+        setup: The setup with the controller.
         t: Times, (m,), in [s].
         q: Positions there, (…, m, n).
     """
@@ -91,24 +91,24 @@ def tracking_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> Tracking:
     reference = controller.desired
     if isinstance(reference, PiecewisePolynomial):
         desired, velocity, _ = reference.at(t)
-        return Tracking(desired, velocity, q - desired)
+        return Tracking(desired, velocity, desired - q)
     if isinstance(reference, CartesianReference) and controller.task_frame is not None:
         p = setup.plant.dynamics.placement(q, controller.task_frame)[..., :3, 3]
-        return Tracking(deviation=p - reference.at(t)[0])
+        return Tracking(tracking_error=reference.at(t)[0] - p)
     return Tracking()
 
 
-def root_mean_square(deviation: np.ndarray) -> float:
-    """Of all entries."""
-    scale = np.ldexp(1.0, np.frexp(np.abs(deviation).max(initial=0.0))[1] - 1)  # that squares do not overflow
-    return float(scale * np.sqrt(np.mean((deviation / scale) ** 2)))
+def root_mean_square(x: np.ndarray) -> float:
+    """Return the root mean square of all entries."""
+    scale = np.ldexp(1.0, np.frexp(np.abs(x).max(initial=0.0))[1] - 1)  # so that squares do not overflow
+    return float(scale * np.sqrt(np.mean((x / scale) ** 2)))
 
 
 def root_mean_squares(x: np.ndarray) -> np.ndarray:
-    """Over the samples of runs (B, m, n) that are not nan, (B, n); nan where a run has none."""
-    known = ~np.isnan(x)
-    sizes = np.abs(x).max(axis=1, where=known, initial=0.0, keepdims=True)
+    """Return the root mean squares over the samples of runs (B, m, n) that are not nan, (B, n); nan without any."""
+    is_number = ~np.isnan(x)
+    sizes = np.abs(x).max(axis=1, where=is_number, initial=0.0, keepdims=True)
     scale = np.ldexp(1.0, np.frexp(sizes)[1] - 1)
-    with np.errstate(invalid="ignore"):  # 0 / 0 where nothing is known
-        mean = np.square(x / scale).sum(axis=1, where=known) / known.sum(axis=1)
+    with np.errstate(invalid="ignore"):  # 0 / 0 if all are nan
+        mean = np.square(x / scale).sum(axis=1, where=is_number) / is_number.sum(axis=1)
     return scale[:, 0] * np.sqrt(mean)

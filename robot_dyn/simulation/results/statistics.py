@@ -13,15 +13,15 @@ class Statistics:
     """Steps, evaluations and times of a run.
 
     Attributes:
-        method: Name of the integrator.
+        method: Name of the integration method.
         step_s: Its step, or 0 if it chose its own.
         steps: Number of steps.
-        evaluations: Evaluations of the equation of motion, those of its Jacobian apart.
+        evaluations: Evaluations of the equation of motion, without those for its Jacobian.
         wall_s: Time of the run itself, in [s].
-        companions_s: Time of the error estimate.
-        engine: Which loop ran, and why if another was possible.
-        compile_s: Time before the run, for the choice of the loop and for compiling it.
-        samples_s: Time after it, for quantities at its samples that are not computed later.
+        companions_s: Time of the error estimate, in [s].
+        engine: The loop that ran, with the reason if another was possible.
+        compile_s: Time before the run, for the choice of the loop and for compiling it, in [s].
+        samples_s: Time after the run, for quantities at its samples that cannot be computed later, in [s].
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Parts of the setup that are user-defined code, by name; each run calls them.
@@ -48,12 +48,13 @@ class Accuracy:
 
     Attributes:
         requested: Largest error of q over joints and times, in [rad] and [m].
-        estimated: The estimated one.
-        rtol: The tolerance that was chosen, atol a hundredth of it; 0 for a method of fixed step.
-        run: Of the run.
-        pilots: Of the runs before it, with their error estimates.
-        check: Of its own error estimate.
-        digit_more, digit_less: Of a run with an error ten times smaller, or larger, by the order of the method.
+        estimated: Estimated error of the run, in [rad] and [m].
+        rtol: Chosen tolerance, atol is a hundredth of it; 0 for a method of fixed step.
+        run: Evaluations of the run.
+        pilots: Evaluations of the runs before it, with their error estimates.
+        check: Evaluations of the error estimate of the run.
+        digit_more, digit_less: Evaluations of a run with a ten times smaller, or larger, error, by the order of the
+            method.
     """
 
     requested: float
@@ -67,7 +68,7 @@ class Accuracy:
 
     @property
     def margin(self) -> float:
-        """The requested over the estimated error: at least 2, or 1 where no tolerance brings more; inf for no error."""
+        """The requested over the estimated error: 2 or more, 1 or more at the least tolerance; inf for no error."""
         return self.requested / self.estimated if self.estimated > 0 else inf
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""The summary of a run: outcome, what acted, energy ledger, error, remarks, tracking, cost."""
+"""The summary of a run: outcome, effects, energy ledger, error, remarks, tracking, cost."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NOTICED = 0.01  # [s]: shorter times are left out
 
 
 def summary(run: TrajectoryData) -> str:
-    """A few lines: outcome, what acted, ledger, error, tracking, cost."""
+    """Return a few lines: outcome, effects, ledger, error, tracking, cost."""
     s, ledger, unit = run.statistics, run.ledger, joint_units("q", joint_types(run))
     opening = f"{run.outcome.ending} at t = {run.outcome.t:g} s, {len(run.t)} samples"
     part = f"{ledger.closure:.1e} of the energy exchanged" if ledger.exchanges else "no energy exchanged"
@@ -35,8 +35,8 @@ def summary(run: TrajectoryData) -> str:
     lines += ["between samples: not observed"] if run.extremes is None else []
     lines += [f"events: {_events_text(run.events)}"] if run.events else []
     lines += [line for line in lines_of(run.remarks) if line != run.outcome.text]
-    if run.tracking_error is not None:
-        lines.append(f"{of_tracking(run, run.desired is None)}: {run.tracking_error:.3e} rms")
+    if run.rms_tracking_error is not None:
+        lines.append(f"{of_tracking(run, run.desired is None)}: {run.rms_tracking_error:.3e} rms")
     step = f"step {s.step_s:.4g} s, " if s.step_s else ""
     lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
     if s.user_code and s.companion_runs:
@@ -57,21 +57,21 @@ def summary(run: TrajectoryData) -> str:
 
 
 def of_tracking(run: RunData, of_frame: bool) -> str:
-    """What a tracking error is of, with its unit."""
-    what = "the frame [m]" if of_frame else f"q [{joint_units('q', joint_types(run))}]"
-    return f"tracking error of {what}"
+    """Return the heading of a tracking error, with its unit."""
+    quantity = "the frame [m]" if of_frame else f"q [{joint_units('q', joint_types(run))}]"
+    return f"tracking error of {quantity}"
 
 
 def _not_estimated(run: TrajectoryData) -> str:
-    """That its error was not estimated, and why."""
+    """Return that no error was estimated, and why."""
     if run.outcome.ending is Ending.STOPPED:
         return "not estimated (the run was stopped)"
     return f"not estimated ({'a run of rollouts' if 'run' in run.about else 'estimate_error is False'})"
 
 
 def _events_text(events: tuple[Occurrence, ...]) -> str:
-    """The first events and their times."""
-    first = [f"{each.name} at {each.t:.4g} s" for each in events[:_LISTED]]
+    """Return the first events and their times."""
+    first = [f"{event.name} at {event.t:.4g} s" for event in events[:_LISTED]]
     return ", ".join(first) + (f", and {len(events) - _LISTED} more" if len(events) > _LISTED else "")
 
 

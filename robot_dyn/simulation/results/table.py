@@ -15,14 +15,14 @@ Types = Mapping[str, str | None]  # of joints, by name
 
 
 def columns(run: TrajectoryData) -> Iterator[Column]:
-    """The quantities with a heading: of joints by name, of sources by name, states by number.
+    """Yield the quantities with a heading: those of joints and sources by name, states by number.
 
-    A deviation from a joint reference is left out: it is q − desired.
+    The tracking error of joints is left out: it is desired − q.
     """
     types = dict(zip(run.joint_names, joint_types(run), strict=True))
     for key, row in SAMPLED.items():
         values = getattr(run.ledger if key in ("energy", "residual") else run, key) if row.heading else None
-        if values is None or (key == "deviation" and run.desired is not None):
+        if values is None or (key == "tracking_error" and run.desired is not None):
             continue
         for name, x in values.items() if isinstance(values, dict) else (("", values),):
             if x.ndim == 1:
@@ -36,6 +36,6 @@ def columns(run: TrajectoryData) -> Iterator[Column]:
 
 
 def of_joints(heading: str, values: np.ndarray, like: str, types: Types, title: str = "") -> Iterator[Column]:
-    """Columns of values (k, n) with the unit of another quantity."""
+    """Yield columns of values (k, n), in the unit of the quantity `like`."""
     for (name, kind), x in zip(types.items(), values.T, strict=True):
         yield Column(heading, x, unit(like, kind), name, title)

@@ -1,4 +1,4 @@
-"""The trajectory of a run: samples with names and units, what each effect did, how it ended, how accurate it is."""
+"""The trajectory of a run: samples with names and units, torques of effects, outcome and accuracy."""
 
 from __future__ import annotations
 
@@ -24,68 +24,68 @@ from robot_dyn.simulation.results.table import columns
 
 @runtime_checkable
 class Theorem(Protocol):
-    """What is proven of a motion, as `rd.tools.proof.Proof`."""
+    """A proven enclosure of a motion; `rd.tools.proof.Proof` is one."""
 
     joint_names: tuple[str, ...]
 
     def contains(self, t: float, q: Any, v: Any = None) -> bool:
-        """Whether a state may be that of the motion at t."""
+        """Return True if the enclosure at t contains a state."""
         ...
 
     def digits_of(self, t: np.ndarray, q: np.ndarray) -> float:
-        """Decimal digits of positions (m, n) at times (m,) that are confirmed."""
+        """Return the number of confirmed decimal digits of positions (m, n) at times (m,)."""
         ...
 
 
 @final
 class Trajectory(TrajectoryData):
-    """Samples of a run, m of them; arrays are (m,) or (m, n).
+    """The m samples of a run and their derived quantities; arrays are (m,) or (m, n).
 
-    What follows from the states of a run of `simulate` is computed when it is first read; where parts are user-defined
-    code, or the run did not finish, `simulate` computes it.
+    Quantities derived from the states are computed on first access. `simulate` computes them itself if the run did not
+    finish, or if parts are user-defined code.
 
     Attributes:
-        joint_names: Of the n joints.
-        t: In [s].
-        q, v, a: In [rad], [rad/s], [rad/s²] or [m], [m/s], [m/s²].
+        joint_names: Names of the n joints.
+        t: Times, in [s].
+        q, v, a: Positions, velocities and accelerations, in [rad], [rad/s], [rad/s²] or [m], [m/s], [m/s²].
         u: Actuation within its bounds, in [N m] or [N].
-        power: Of the control and of each effect without a potential, by name, in [W].
+        power: Power of the control and of each effect without a potential, by name, in [W].
         ledger: Energy and work.
         desired: Positions of a joint reference, or None.
-        deviation: q − q_d, (m, n); or p − p_d of a frame that follows a Cartesian reference, (m, 3) in [m];
+        tracking_error: q_d − q, (m, n); or p_d − p of a frame that follows a Cartesian reference, (m, 3) in [m];
             None without a reference.
-        outcome: How it ended.
-        statistics: What it took.
-        error: Its estimated error; None without an estimate.
-        about: Texts that make it whole: URDF, its path, edits, settings, scene, versions; the controlled frame and the
-            file that it was read from, if any.
+        outcome: Reason and time of the end.
+        statistics: Steps, evaluations and times.
+        error: Estimated error; None without an estimate.
+        about: Texts from which the run can be repeated: URDF, its path, edits, settings, scene, versions; the
+            controlled frame and the file that it was read from, if any.
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.
-        at_stop: Whether each joint is at or beyond a stop, (m, n); None without stops.
-        remarks: What was observed at every step and need not show in the samples.
+        at_stop: True where a joint is at or beyond a stop, (m, n); None without stops.
+        remarks: Observations at every step, which the samples may not show.
         extremes: The least and the largest of q, v and u over all steps, (3, 2, n); None if they were not observed.
-        acting: Names of what acted: gravity, payloads, effects, limits, control; None if it is not known.
-        controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
-            were not recorded.
-        events: Where effects switched, and requested ones, in the order of time.
-        effect_states: z of each effect with states, by name, (m, z); empty if they were not recorded.
+        acting: Names of gravity, payloads, effects, limits and control that acted; None if unknown.
+        controller_states: States z of the controller, (m, z), after the tick if it is sampled; None if it has none, or
+            they were not recorded.
+        events: Switches of effects, and user-defined events, in the order of time.
+        effect_states: States z of each effect with states, by name, (m, z); empty if they were not recorded.
         accuracy: The requested accuracy and its cost; None if none was requested.
-        effect_torques: What each effect exerted on the joints by name, (m, n), in [N m] or [N], so that
+        effect_torques: Torques of each effect on the joints by name, (m, n), in [N m] or [N], so that
             M a + C v + ∂V/∂q = u + their sum; None if they were not recorded.
         desired_velocity: Velocities of a joint reference, or None.
     """
 
     def proven_digits(self, proof: Theorem) -> float:
-        """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
+        """Return the decimal digits of q that a proof confirms: −log₁₀ of the largest possible error in [rad] or [m].
 
         Args:
-            proof: Of the same motion, as `rd.tools.proof.prove` returns it; samples after its end are left out.
+            proof: Proof of the same motion, see `rd.tools.proof.prove`; samples after its end are ignored.
 
         Raises:
-            QueryError: If it is of other joints, or its motion starts elsewhere.
+            QueryError: If its joints differ, or its motion starts at another state.
         """
         if not isinstance(proof, Theorem):
-            raise QueryError(f"proof: give one, as rd.tools.proof.prove(setup), got {shown(proof)}")
+            raise QueryError(f"proof: pass the result of rd.tools.proof.prove(setup), got {shown(proof)}")
         if proof.joint_names != self.joint_names:
             raise QueryError(f"proof is of the joints {', '.join(proof.joint_names)}; give one of this motion")
         if self.t[0] == 0 and not proof.contains(0.0, self.q[0], self.v[0]):
@@ -93,19 +93,20 @@ class Trajectory(TrajectoryData):
         return proof.digits_of(self.t, self.q)
 
     def causes(self) -> Causes:
-        """The actuation of each joint at the samples by cause: inertia, Coriolis, gravity, and each effect by its name.
+        """Return the actuation of each joint at the samples by cause: inertia, Coriolis, gravity, and effects by name.
 
-        The causes add up to u, to rounding. Where several effects hold a joint at rest, dry friction takes what it can
-        and stops the rest. The cause of a drive is what its motor takes for itself, less the torque of its spring.
+        The causes add up to u, to rounding. If several effects hold a joint at rest, dry friction has as large a part
+        as possible, and stops the rest. The cause of a drive is the torque that its motor needs, less the torque of its
+        spring.
 
         Raises:
-            QueryError: If the run carries no robot, or does not hold what its effects exerted.
+            QueryError: If the run contains no robot, or no torques of its effects.
         """
         return causes_of(self)
 
     @property
     def summary(self) -> str:
-        """A few lines: outcome, what acted, ledger, error, tracking, cost."""
+        """A few lines: outcome, effects, ledger, error, tracking, cost."""
         return summary(self)
 
     def _columns(self) -> Iterator[Column]:

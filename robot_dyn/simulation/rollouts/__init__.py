@@ -1,8 +1,8 @@
 """Many runs of one setup, side by side.
 
 - rollouts: the function `rollouts`, its arguments, and the choice between the two ways of running a batch.
-- batch: starts and values that differ from run to run, and the record of the runs; thresholds: where runs in lock step
-  would need cut steps.
+- batch: starts and values that differ from run to run, and the record of the runs; thresholds: levels at which runs in
+  lock step would need cut steps.
 - lock_step: 64 runs per tile in machine code; one_by_one: runs one after the other on each thread; pool: the threads.
 - rollouts_data: the fields of `Rollouts`; result: `Rollouts`; run: one of its runs as a `Trajectory`; overview:
   remarks, tracking errors, causes of divergence; table: its table.

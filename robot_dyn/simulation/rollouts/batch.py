@@ -1,4 +1,4 @@
-"""A batch: a setup, with the starts and the values that differ from run to run; and what its runs recorded."""
+"""A batch: a setup, with the starts and the values that differ from run to run; and the record of its runs."""
 
 from __future__ import annotations
 
@@ -77,17 +77,17 @@ class Batch:
 
     @property
     def why_one_by_one(self) -> str:
-        """Why the runs do not go in lock step; empty if they do."""
-        setup, method = self.setup, self.setup.integrator
+        """Reason why the runs are not in lock step; empty if they are."""
+        setup, method = self.setup, self.setup.method
         motion = setup.plant.equation_of_motion
         if method.controls_error:
             return f"{method.name} chooses its steps"
         if setup.engine == "interpreted":
             return "the engine is interpreted"
         if motion.set_valued and not method.nonsmooth:
-            return f"{motion.set_valued[0].name} holds joints and lets them go, where steps must end"
+            return f"{motion.set_valued[0].name} stops and releases joints, where steps must end"
         if motion.payloads:
-            return f"{motion.payloads[0].name} comes and goes, where steps must end"
+            return f"{motion.payloads[0].name} is attached and detached, where steps must end"
         return "steps end at events" if setup.events else ""
 
     @cached_property
@@ -102,8 +102,8 @@ class Single(NamedTuple):
     Attributes:
         t: Times of its samples, (k,), in [s].
         columns: Recorded quantities, (k, …) by name.
-        outcome: How it ended.
-        steps, evaluations: Their numbers.
+        outcome: Outcome of the run.
+        steps, evaluations: Number of steps and of evaluations of the equation of motion.
         observation: Observations of all steps.
     """
 
@@ -118,13 +118,13 @@ class Single(NamedTuple):
 @final
 @dataclass(eq=False)
 class Record:
-    """What a batch recorded, and how its runs ended; both ways of running write into its arrays.
+    """The record of a batch and the outcomes of its runs; both ways of running write into its arrays.
 
     Attributes:
         setup: Setup whose equations ran.
         t: Times of the samples, (m,), in [s].
         columns: Recorded quantities, (B, m, size) by name; nan after the end of a run.
-        outcomes: How each run ended, B of them.
+        outcomes: Outcomes of the B runs.
         steps, evaluations: See `Rollouts`.
         statistics: Statistics of the batch.
         observed: Observations of all runs.

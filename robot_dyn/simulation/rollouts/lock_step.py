@@ -1,7 +1,7 @@
-"""A batch of runs in tiles of 64 in lock step, each tile run by one thread from beginning to end.
+"""A batch of runs in tiles of 64 in lock step, one thread for each tile.
 
-Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. Where `simulate` cuts
-steps at thresholds, the runs that may pass one are repeated one by one, and replace those of lock step.
+Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. If `simulate` cuts
+steps at thresholds, the runs that may pass one are repeated one by one, and replace the runs of lock step.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ _REASONS = {
     LaneEnd.ENERGY_GAIN: Reason.ENERGY_WITHOUT_SOURCE,
     LaneEnd.NO_STAGES: Reason.STAGES_NOT_FOUND,
 }
-_INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
+_INSTANTS = 200  # least number of instants at which an actuation that changes between ticks is observed
 
 
 @final
 class Tiles:
-    """The tiles of a batch and what they record: time by row by run, so that a tile writes whole vectors.
+    """The tiles of a batch and their record: time by row by run, so that a tile writes whole vectors.
 
     Args:
         batch: The runs.
-        code: Their state equation, with the extras of the batch.
+        code: Machine code of their state equation, with the extras of the batch.
         thresholds: Thresholds at which steps are cut; None without any, or if cuts are not requested.
     """
 
@@ -89,7 +89,7 @@ class Tiles:
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Record:
-        """Run all tiles, each on one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
+        """Run all tiles, one thread for each; Ctrl-C or an error of `on_progress` ends them at their next step."""
         began, end, reached = perf_counter(), self.setup.duration_s, 0.0
 
         def report(t: float) -> None:
@@ -105,16 +105,16 @@ class Tiles:
         return result
 
     def _reached(self) -> float:
-        """Return the mean time reached, in [s], of the runs that are not to be repeated."""
+        """Return the mean time reached, in [s], of the runs that need no repetition."""
         end, left = self.setup.duration_s, np.isinf(self.until).reshape(-1, LANES).mean(axis=1)
         next_samples = np.array([position.sample_time[0] for position in self.positions])
         return float((left * np.where(self.unfinished, np.minimum(next_samples, end), end)).mean())
 
     def _repeated(self, threads: int, report: Callable[[float], object]) -> dict[int, Single | None]:
-        """Repeat, by themselves, runs that lock step cannot judge; None where Ctrl-C came first.
+        """Repeat separately the runs that lock step cannot judge; None for a run that did not start before Ctrl-C.
 
-        With cuts, these are the runs that may have passed a threshold or diverged. In addition, they are the runs that
-        finished at an implausible speed: `simulate` judges them by their energy ledger, which is not recorded here.
+        With cuts, these runs may have passed a threshold or diverged. Runs that finished at an implausible speed are
+        repeated too: `simulate` judges them by their energy ledger, which is not recorded here.
         """
         B, end, whole = len(self.batch), self.setup.duration_s, self.batch.thresholds
         passed = (np.isfinite(self.until) | (self.why > 0)) & (self.thresholds is not None)
@@ -128,7 +128,7 @@ class Tiles:
         return dict(zip(runs.tolist(), records, strict=True))
 
     def _implausible(self) -> np.ndarray:
-        """Return which runs finished with a joint faster than its speed limit, (tiles · LANES,)."""
+        """Return True for runs that finished with a joint above its speed limit, (tiles · LANES,)."""
         n = self.setup.plant.dynamics.n
         low, high = (np.hstack([getattr(of, side)[n : 2 * n] for of in self.observations]) for side in ("low", "high"))
         fast = (np.maximum(-low, high) > cached(self.setup, speed_limits)[:, None]).any(axis=0)
@@ -141,7 +141,7 @@ class Tiles:
         run_parameters = self.code.run_parameters({name: x[numbers] for name, x in self.batch.sweep.items()})
         noise, more = self.batch.number_of(numbers), self.out_extras.shape[1]
         runs = lanes_of(equation, self.y[numbers].T, run_parameters, more, self.table.parameters[0], noise)
-        method = cast(PlainMethod, self.setup.integrator)
+        method = cast(PlainMethod, self.setup.method)
         assert self.code.machine_loop is not None
         advance = self.code.machine_loop.calls()
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
@@ -163,7 +163,7 @@ class Tiles:
             largest=LARGEST,
             base=lanes.start,
             apart=self.apart,
-            sample_period=float(self.setup.record_period_s or 0.0),
+            sample_period=float(self.setup.record_every_s or 0.0),
             sample_slack=ON_STEP * self.setup.nominal_step_s,
         )
         work = stepper.work
@@ -187,7 +187,7 @@ class Tiles:
                 array[rows:, :, lanes] = np.nan
 
     def _record(self, repeated: dict[int, Single | None], began: float) -> Record:
-        """Return the record of lock step, with repeated runs in place of those that passed a threshold."""
+        """Return the record of lock step, in which repeated runs replace those that passed a threshold."""
         B, setup, t = len(self.batch), self.setup, max(self.t, key=len)
         why, ended = self.why[:B], self.ended[:B].copy()
         outcomes = [Outcome(Reason.END, setup.duration_s)] * B
@@ -209,7 +209,7 @@ class Tiles:
         instants = self.steps // self.apart if self.apart > 1 else 0
         result = Record(
             _compiled(setup), t, columns, outcomes, self._steps(ended), np.repeat(self.evaluations, LANES)[:B],
-            Statistics(setup.integrator.name, step, self.steps, most, perf_counter() - began, engine=label),
+            Statistics(setup.method.name, step, self.steps, most, perf_counter() - began, engine=label),
             observed(self.observations, self.levels, alone, instants)[:B],
         )  # fmt: skip
         for run, single in repeated.items():

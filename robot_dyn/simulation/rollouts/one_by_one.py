@@ -1,4 +1,4 @@
-"""Runs of a batch one after the other on each thread, each as `simulate` runs it: with its own steps and cuts."""
+"""Runs of a batch one after the other on each thread; each has the steps and cuts of `simulate`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from robot_dyn.simulation.setup.setup import Setup
 def singles(
     batch: Batch, levels: GuardLevels, threads: int, on_progress: Callable[[float], object] | None = None
 ) -> tuple[list[Single | None], Engine]:
-    """Make each run of a batch by itself; Ctrl-C ends them, and an error of `on_progress`.
+    """Run each run of a batch separately, until Ctrl-C or an error of `on_progress`.
 
     Args:
         batch: The runs.
@@ -37,7 +37,7 @@ def singles(
         on_progress: Called with the mean time reached, in [s].
 
     Returns:
-        Record of each run, None where Ctrl-C came first, and the engine of the batch.
+        The record of each run, None for a run that did not start before Ctrl-C, and the engine of the batch.
     """
     setup, engine = batch.setup, choose_for_batch(batch.setup, tuple(batch.sweep))
     records: list[Single | None] = [None] * len(batch)
@@ -67,17 +67,17 @@ def singles(
 
 
 def _single(batch: Batch, setup: Setup, record: Recording, observation: Observation) -> Single:
-    """Return the record of a run without the sample at an event that ended it, which no other run has."""
+    """Return the record of a run, without the sample at a terminal event, which is at no common time."""
     outcome = record.outcome
     early = outcome.ending is Ending.FINISHED and outcome.t < setup.duration_s
     rows = int(np.searchsorted(record.t, outcome.t)) if early else len(record.t)
-    values = columns(setup.equation, record.t, record.y, record.made)
+    values = columns(setup.equation, record.t, record.y, record.sampled)
     recorded = {name: getattr(values, name)[:rows].copy() for name in batch.recorded}
     return Single(record.t[:rows], recorded, outcome, record.steps, record.evaluations, observation)
 
 
 def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object] | None = None) -> Record:
-    """Return the record of a batch whose runs are made as by `singles`; a run that did not begin has its start."""
+    """Return the record of a batch, run by `singles`; the record of a run that did not begin is its start."""
     setup, B, began = batch.setup, len(batch), perf_counter()
     levels = batch.levels(setup.plant, setup.controller)
     records, engine = singles(batch, levels, threads, on_progress)
@@ -90,11 +90,11 @@ def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object
         if name in ("q", "v"):
             x[:, 0] = batch.q0 if name == "q" else batch.v0
     label = f"{engine.label}, {B} run{'s' * (B > 1)} one after the other on each thread"
-    step = 0.0 if setup.integrator.controls_error else setup.duration_s / setup.steps
+    step = 0.0 if setup.method.controls_error else setup.duration_s / setup.steps
     steps, evaluations = (max((getattr(x, of) for x in made.values()), default=0) for of in ("steps", "evaluations"))
     result = Record(
         setup, t, recorded, [Outcome(Reason.INTERRUPTED, 0.0)] * B, np.zeros(B, np.int64), np.zeros(B, np.int64),
-        Statistics(setup.integrator.name, step, steps, evaluations, perf_counter() - began, engine=label),
+        Statistics(setup.method.name, step, steps, evaluations, perf_counter() - began, engine=label),
         observed([starts], levels, {i: record.observation for i, record in made.items()}),
     )  # fmt: skip
     for i, record in made.items():

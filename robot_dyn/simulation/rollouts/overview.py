@@ -1,4 +1,4 @@
-"""Overview of a batch: remarks with counts, tracking errors, and the run to look at first."""
+"""Overview of a batch: remarks with counts, tracking errors, and the run to examine first."""
 
 from __future__ import annotations
 
@@ -31,35 +31,35 @@ def overview(runs: RolloutsData) -> Overview:
         setup = runs.setup_of(run)
         return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run])
 
-    errors, remarks = tracking_errors(runs), tuple(_remarks(runs, remedy))
+    errors, remarks = rms_tracking_errors(runs), tuple(_remarks(runs, remedy))
     worst = worst_of(runs, remarks, errors)
     return Overview(worst, (*remarks, *_linearised(runs, worst)), errors)
 
 
 def remarks_on_each(runs: RolloutsData) -> tuple[Remark, ...]:
-    """Return the remarks that a run has whatever the others of its batch are, without remedies."""
+    """Return the remarks that do not depend on the other runs of the batch, without remedies."""
     return tuple(_remarks(runs, lambda _: lambda _: {}))
 
 
 def _remarks(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
-    """Yield remarks on what was observed, and on the reference, with a remedy for the chatter of a run."""
+    """Yield remarks on observations and on the reference, with a remedy for the chatter of a run."""
     yield from _counted(runs, remedy)
     if runs.setup is not None:
         yield from _of_references(runs, runs.setup)
 
 
 def texts_by_run(remarks: Iterable[Remark], count: int) -> list[str]:
-    """What the remarks on each of so many runs are about, such as "effort_limit_reached u elbow"; empty for none."""
+    """Return kind, quantity and joint of the remarks on each run, "effort_limit_reached u elbow"; empty for none."""
     of_run: list[list[str]] = [[] for _ in range(count)]
-    for each in remarks:
-        for run in each.runs:
-            of_run[run].append(f"{each.kind} {each.quantity} {each.joint}")
+    for remark in remarks:
+        for run in remark.runs:
+            of_run[run].append(f"{remark.kind} {remark.quantity} {remark.joint}")
     return ["; ".join(texts) for texts in of_run]
 
 
 def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
-    """Of runs without their setup that were these of a larger batch."""
-    errors = None if whole.tracking_error is None else whole.tracking_error[numbers]
+    """Return the overview of runs without their setup, which have these numbers in a larger batch."""
+    errors = None if whole.rms_tracking_error is None else whole.rms_tracking_error[numbers]
     facts = {remark.kind: remark.facts for remark in whole.remarks}
     remarks = *_counted(runs, lambda _: lambda _: facts[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
     alone = (remark for remark in whole.remarks if remark.looked == 1 != len(numbers) and remark.runs[0] in numbers)
@@ -68,36 +68,37 @@ def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
 
 
 def remarks_of(runs: RolloutsData, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
-    """On what was observed of one run, with positions q (m, n) at times t (m,)."""
+    """Return the remarks on the observations of one run, with positions q (m, n) at times t (m,)."""
     visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
     remedy = (lambda _: {}) if setup is None else against(setup, t, q)
     instants = int(runs.observed.instants[run])
-    found = of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants)
+    remarks = of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants)
     if setup is not None:
-        found += of_reference(setup, t, runs.observed.extremes[run], units(runs))
+        remarks += of_reference(setup, t, runs.observed.extremes[run], units(runs))
     elif runs.saved is not None:
-        found += (replace(each, runs=(), looked=0) for each in _of_whole(runs.saved, range(run, run + 1)))
-    return tuple(found)
+        whole = _of_whole(runs.saved, range(run, run + 1))
+        remarks += (replace(remark, runs=(), looked=0) for remark in whole)
+    return tuple(remarks)
 
 
 def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
-    """Remarks on the reference of some runs of a batch without their setup; the text may be of another of them."""
-    for each in whole.remarks:
-        of = tuple(numbers.index(run) for run in each.runs if run in numbers)
-        if of and each.kind in OF_REFERENCES:
-            elsewhere = {} if each.runs[0] in numbers else {"elsewhere": "in another run"}
-            yield replace(each, runs=of, looked=len(numbers), facts=each.facts | elsewhere)
+    """Yield remarks on the reference of some runs of a batch without their setup; the text may be about another run."""
+    for remark in whole.remarks:
+        of = tuple(numbers.index(run) for run in remark.runs if run in numbers)
+        if of and remark.kind in OF_REFERENCES:
+            elsewhere = {} if remark.runs[0] in numbers else {"elsewhere": "in another run"}
+            yield replace(remark, runs=of, looked=len(numbers), facts=remark.facts | elsewhere)
 
 
 def units(runs: RolloutsData) -> Units:
-    """Of q, v and u of each joint."""
+    """Return the units of q, v and u of each joint."""
     if runs.setup is not None:
         return units_of(runs.setup.plant.dynamics)
-    return [(unit("q", each), unit("v", each), unit("u", each)) for each in joint_types(runs)]
+    return [(unit("q", kind), unit("v", kind), unit("u", kind)) for kind in joint_types(runs)]
 
 
 def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
-    """Yield, for each kind, joint and quantity, the remark on the worst run, and which runs have one."""
+    """Yield, for each kind, joint and quantity, the remark on the worst run, with the numbers of the affected runs."""
     of = runs.observed
     named = runs.joint_names, units(runs)
     amplitudes = of.episodes[:, :, 2]
@@ -106,10 +107,9 @@ def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Fac
             worst = int(amplitudes[:, joint].argmax())
             (remark,) = of_steps(*named, {}, {joint: of.episodes_of(worst)[joint]}, remedy(worst))
             yield _in_runs(remark, worst, amplitudes[:, joint] > 0)
-    for kind, row in sorted(
-        {(each.kind, each.row) for each in of.levels}, key=lambda each: (KINDS.index(each[0]), each)
-    ):
-        both = [k for k, each in enumerate(of.levels) if (each.kind, each.row) == (kind, row)]
+    places = {(level.kind, level.row) for level in of.levels}
+    for kind, row in sorted(places, key=lambda place: (KINDS.index(place[0]), place)):
+        both = [k for k, level in enumerate(of.levels) if (level.kind, level.row) == (kind, row)]
         _, duration, _, value = np.moveaxis(of.visits[:, both], 2, 0)
         some = ~np.isnan(duration).all(axis=1)
         if some.any():
@@ -122,7 +122,7 @@ def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Fac
 
 
 def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
-    """Remarks on the reference, which all runs share: where it jumps from their starts, which joints friction holds."""
+    """Yield remarks on the common reference: jumps from the starts of runs, and joints that friction holds."""
     for remark, gaps in jumps(setup, runs.q0, runs.v0, units(runs)):
         yield _in_runs(remark, int(gaps.argmax()), gaps > 0)
     if not any(isinstance(effect, DryFriction) for effect in setup.plant.effects):
@@ -130,22 +130,24 @@ def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
     extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
         plant, controller = runs._parts(setup, run)
-        of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]})  # all was checked
+        of_run = with_values(
+            setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]}
+        )  # the values were checked
         for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
             of.setdefault(remark.joint, []).append((run, remark))
-    for each in of.values():
-        worst, remark = max(each, key=lambda pair: pair[1].limit or 0.0)
-        yield _in_runs(remark, worst, np.isin(np.arange(len(runs)), [run for run, _ in each]))
+    for pairs in of.values():
+        worst, remark = max(pairs, key=lambda pair: pair[1].limit or 0.0)
+        yield _in_runs(remark, worst, np.isin(np.arange(len(runs)), [run for run, _ in pairs]))
 
 
 def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
-    """A remark on the worst run as one on some (B,) of a batch."""
+    """Return a remark on the worst run as a remark on some runs (B,) of a batch."""
     numbers = (int(run) for run in np.flatnonzero(some) if run != worst)
     return replace(remark, runs=(worst, *numbers), looked=len(some))
 
 
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
-    """The remark on the sampled loop of one run."""
+    """Yield the remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
     for remark in unstable(
         setup, *states(setup, *samples_of(runs, run)), bool(runs.diverged[run]), end=runs.ends[run].t
@@ -154,25 +156,27 @@ def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
 
 
 def worst_of(runs: RolloutsData, remarks: tuple[Remark, ...], errors: np.ndarray | None) -> int:
-    """As of `Rollouts.worst`."""
+    """Return the number of the run to examine first, see `Rollouts.worst`."""
     if runs.diverged.any():
         return int(np.where(runs.diverged, runs.ended, np.inf).argmin())
     for remark in remarks:
         if remark.kind is RemarkKind.CHATTER:
             return remark.runs[0]
-    beyond = [each for each in remarks if each.kind is RemarkKind.BEYOND and each.limit]
+    beyond = [remark for remark in remarks if remark.kind is RemarkKind.BEYOND and remark.limit]
     if beyond:
-        return max(beyond, key=lambda each: abs(each.value / (each.limit or 1.0) - 1)).runs[0]
+        return max(beyond, key=lambda remark: abs(remark.value / (remark.limit or 1.0) - 1)).runs[0]
     return 0 if errors is None or np.isnan(errors).all() else int(np.nanargmax(errors))
 
 
-def tracking_errors(runs: RolloutsData) -> np.ndarray | None:
-    """As of `Rollouts.tracking_error`; nan for a run that was not begun."""
+def rms_tracking_errors(runs: RolloutsData) -> np.ndarray | None:
+    """Return the rms tracking error of each run, see `Rollouts`; nan for a run that did not begin."""
     if runs.q is None or runs.setup is None or runs.setup.controller is None:
         return None
-    known = np.isfinite(runs.q.sum(axis=2))
-    q = np.where(known[..., None], runs.q, 0.0)
-    deviation = tracking_of(runs.setup, runs.t, q).deviation
-    if deviation is None:
+    finite = np.isfinite(runs.q.sum(axis=2))
+    q = np.where(finite[..., None], runs.q, 0.0)
+    errors = tracking_of(runs.setup, runs.t, q).tracking_error
+    if errors is None:
         return None
-    return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
+    return np.array(
+        [root_mean_square(x[rows]) if rows.any() else np.nan for x, rows in zip(errors, finite, strict=True)]
+    )

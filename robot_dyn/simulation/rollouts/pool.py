@@ -1,4 +1,4 @@
-"""Work that threads share, followed by the caller: progress, Ctrl-C, and errors."""
+"""A thread pool whose caller receives progress, Ctrl-C and errors."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 def in_threads(
     work: Callable[[int], None], count: int, threads: int, stop: np.ndarray, look: Callable[[], object] | None = None
 ) -> None:
-    """Call work(0), work(1), … up to the count, in so many threads.
+    """Call work(0), …, work(count − 1) in threads.
 
     Args:
-        work: What is called; an error of it is raised here, once all have ended.
+        work: Function to call; its error is raised here after all calls have ended.
         count: Number of calls.
-        threads: Of these, at most.
-        stop: Its first entry becomes 1 on Ctrl-C, or where `look` raises: what runs is to end soon, and so is what is
-            called from then on. Ctrl-C raises nothing here.
+        threads: Largest number of threads.
+        stop: Its first entry becomes 1 on Ctrl-C, or if `look` raises an error. Calls in progress and later ones must
+            then end soon. Ctrl-C raises no error here.
         look: Called some ten times a second, in the thread of the caller.
     """
     with ThreadPoolExecutor(min(threads, count), "robot_dyn") as pool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
 from robot_dyn.simulation.diagnostics.runaway import step_too_long
@@ -16,14 +18,16 @@ Samples = tuple[np.ndarray, np.ndarray | None, np.ndarray | None]
 def reason_of(setup: Setup, end: Outcome, samples: Samples) -> Outcome:
     """Return the outcome of a run that diverged, with its step or its loop as the reason if that explains it.
 
-    The search for a stable period or stable gains is left to `simulate`, since it takes most of the time.
+    Only `simulate` searches for a stable period or stable gains, because that takes most of the time.
     """
+    step_s = end.facts.get("step_s")  # to find it from the setup takes long if there are many ticks
+    step = step_too_long(setup, end.t, None if step_s is None else float(step_s))
     loop = unstable(setup, *states(setup, *samples), runs_away=True, remedies=False, end=end.t)
-    return explained(end, setup, (*step_too_long(setup, end.t), *loop))
+    return explained(end, setup, chain(step, loop))  # the loop is linearised only if the step explains nothing
 
 
 def states(setup: Setup, t: np.ndarray, q: np.ndarray | None, v: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return times (m,) and states (m, size) of a run; the start alone if not all of the state was recorded."""
+    """Return times (m,) and states (m, size) of a run; only the start if part of the state was not recorded."""
     equation = setup.equation
     if q is None or v is None or equation.equation_of_motion.state_size:
         return np.zeros(1), equation.start(setup.q0, setup.v0)[None]

@@ -29,7 +29,7 @@ from robot_dyn.simulation.rollouts.table import columns, samples
 from robot_dyn.simulation.run.outcome import Reason
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
-_MOST_DRAWN = 2000  # runs whose quantiles a notebook shows
+_MOST_DRAWN = 2000  # largest number of runs for the quantiles in a notebook
 _QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
 
@@ -47,10 +47,10 @@ class Rollouts(RolloutsData):
         u: Actuation within its bounds, (B, m, n), in [N m] or [N].
         kinetic, potential: Energies, (B, m), in [J].
         work: Work done up to each sample by the control and by each other effect, by name, (B, m), in [J].
-        ends: How each run ended, B of them, before its step and its loop are judged; see `outcomes`.
+        ends: Ends of the B runs, before their steps and loops are judged; see `outcomes`.
         steps: Number of steps of each run, (B,).
         evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
-        statistics: Statistics of the longest run; the time is that of all runs.
+        statistics: Statistics of the longest run; the time is for all runs.
         sources: Names of the sources of work: the control and the effects without a potential.
         about: Texts common to all runs, as in `Trajectory`, without `params`.
         params: Values that differ from run to run, by name, (B, n).
@@ -60,8 +60,8 @@ class Rollouts(RolloutsData):
         observed: Extremes, limits passed and chatter of each run, over all steps except for u of continuous control
             (see `remarks`).
         saved: Overview stored with runs read from a file; None otherwise.
-        numbers: Number of each run, which determines its noise, (B,): those that were given, or of a slice those in
-            the original batch; None for a batch numbered from 0 on, and for runs read from a file.
+        numbers: Number of each run, which determines its noise, (B,): the argument of `rollouts`, or for a slice the
+            numbers in the original batch; None for a batch numbered from 0 on, and for runs read from a file.
     """
 
     def __iter__(self) -> Iterator[Trajectory]:
@@ -75,11 +75,11 @@ class Rollouts(RolloutsData):
     def __getitem__(self, run: int | slice) -> Trajectory | Rollouts:
         """Return the trajectory of a run, counted from the end if negative; or the runs in a slice.
 
-        Positions and velocities are those recorded. Other quantities are either recorded or computed from them and
-        the setup: the acceleration, the powers and energies, and the torque of a continuous controller without an
-        integral. Quantities available from neither are nan: work that was not recorded, the torque of other
-        controllers and, for runs read from a file, everything that was not recorded. The trajectory has no error
-        estimate, and only the remarks of `simulate` on limits, stops, chatter and the reference.
+        Positions and velocities are the recorded ones. Other quantities are recorded, or computed from them and the
+        setup: the acceleration, the powers and energies, and the torque of a continuous controller without an
+        integral. The rest is nan: work that was not recorded, the torque of other controllers and, for runs read from
+        a file, all quantities that were not recorded. The trajectory has no error estimate, and only the remarks of
+        `simulate` on limits, stops, chatter and the reference.
 
         Raises:
             QueryError: If q or v was not recorded, a slice is empty, or `run` is neither an integer nor a slice.
@@ -94,13 +94,13 @@ class Rollouts(RolloutsData):
         try:
             number = range(len(self))[index(None if isinstance(run, bool) else run)]  # type: ignore[arg-type]
         except TypeError:
-            raise QueryError(f"runs are numbered: give a whole number or a slice, got {run!r}") from None
+            raise QueryError(f"runs are numbered: pass a whole number or a slice, got {run!r}") from None
         except IndexError:
             raise IndexError(f"there is no run {run}: runs are numbered from 0 to {len(self) - 1}") from None
         return trajectory(self, number)
 
     def _some(self, runs: slice) -> Rollouts:
-        """Return the runs of a slice, without the `saved` overview, which is of all."""
+        """Return the runs of a slice, without the `saved` overview of all runs."""
 
         def of(x: Any) -> Any:
             if isinstance(x, dict):
@@ -120,21 +120,21 @@ class Rollouts(RolloutsData):
     def remarks(self) -> tuple[Remark, ...]:
         """The remarks of `simulate` on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
 
-        `Remark.runs` lists the affected runs: first the worst, which supplies the values and text of the remark, then
-        the others in order. A sampled loop is linearised only for the run `worst`. Under continuous control in lock
+        `Remark.runs` lists the affected runs: first the worst, whose values and text the remark contains, then the
+        others in order. A sampled loop is linearised only for the run `worst`. Under continuous control in lock
         step, a violation of a limit of u between the instants counted by `Observed.instants` may be missed, and
         chatter is not detected.
         """
         return self.overview.remarks
 
     @property
-    def tracking_error(self) -> np.ndarray | None:
+    def rms_tracking_error(self) -> np.ndarray | None:
         """Tracking error of each run, as in `Trajectory`, (B,); None without a reference, or if q was not recorded."""
-        return self.overview.tracking_error
+        return self.overview.rms_tracking_error
 
     @property
     def worst(self) -> int:
-        """Number of the run to look at first.
+        """Number of the run to examine first.
 
         In order of priority: the first run to diverge; the run with the largest chatter; the run that exceeds a limit
         in the file by the largest fraction; the run with the largest tracking error; or 0.
@@ -179,30 +179,29 @@ class Rollouts(RolloutsData):
 
     @property
     def summary(self) -> str:
-        """Number of runs, how many ended early and why, remarks, tracking error, and the run to look at first."""
+        """Number of runs, how many ended early and why, remarks, tracking error, and the run to examine first."""
         count = "1 run" if len(self) == 1 else f"{len(self)} runs"
         lines = [f"{count} of {len(self.t)} samples to t = {self.t[-1]:g} s; {self._early()}"]
         lines += about_the_robot(self)
         if self.uncut:
             levels = ", ".join(self.uncut)
-            lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
+            lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one differs from simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.outcome(run).text}")
         counted = len(self) > 1
-        remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
-        lines += lines_of(remarks)
-        errors = self.tracking_error
+        lines += lines_of(remark if counted else replace(remark, runs=()) for remark in self.remarks)
+        errors = self.rms_tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
             largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""
             lines.append(f"{of_tracking(self, 'frame' in self.about)}: {np.nanmedian(errors):.3e} rms{largest}")
-        again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
-        lines.append(f"look at run {self.worst} first{again}")
+        again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it alone"
+        lines.append(f"worst run: {self.worst}{again}")
         return "\n".join(escaped(line) for line in lines)
 
     def _early(self) -> str:
-        """How many runs ended early, and why."""
+        """Return how many runs ended early, and why."""
         at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
         by_event = sum(outcome.reason is Reason.TERMINAL_EVENT for outcome in self.ends)
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"

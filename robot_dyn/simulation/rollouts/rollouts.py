@@ -25,7 +25,7 @@ from robot_dyn.foundations.coefficients import rebuilt
 from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, truth
 from robot_dyn.foundations.values import several
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, Adaptive
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.cache import machine_code
 from robot_dyn.simulation.compiled.choice import checked
@@ -62,7 +62,7 @@ def rollouts(
     """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
 
     Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
-    `integrator="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
+    `method="RK4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
     (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each thread,
     with steps that end there, in a few milliseconds a run. So are all runs by a method
     that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
@@ -107,13 +107,13 @@ def rollouts(
         TraceError: If a part of the setup cannot be compiled; names it.
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
-    if setup.integrator.name == AUTO:
-        setup = replace(setup, integrator=replace(setup.integrator, method=EXPLICIT))
+    if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
+        setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
-    if not setup.integrator.plain:
+    if not setup.method.plain:
         raise QueryError(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
-            f" {setup.integrator.name}: give integrator='rk4' and its step_s; simulate takes any method"
+            f" {setup.method.name}: give method='RK4' and its step_s; simulate takes any method"
         )
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
@@ -181,7 +181,7 @@ def run_batch(
         record = one_by_one(batch, threads, on_progress)
     else:
         build = partial(
-            machine_code, setup.equation, setup.integrator, lanes=LANES, extras=batch.extras,
+            machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras,
             swept=tuple(batch.sweep), detects=passed is not None and cuts,
         )  # fmt: skip
         record = Tiles(batch, checked(setup, build), passed if cuts else None).run(threads, on_progress)

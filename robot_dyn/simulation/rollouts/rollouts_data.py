@@ -10,6 +10,7 @@ import numpy as np
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.store import NOT_STORED, Layout
 from robot_dyn.foundations.validate import integer
@@ -29,12 +30,12 @@ class Overview(Value):
     """The overview of a batch.
 
     Attributes:
-        worst, remarks, tracking_error: As of `Rollouts`.
+        worst, remarks, rms_tracking_error: See `Rollouts`.
     """
 
     worst: int
     remarks: tuple[Remark, ...]
-    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
+    rms_tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -42,7 +43,7 @@ class Overview(Value):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RolloutsData(RunData):
-    """The fields of B runs, as `Rollouts` describes them."""
+    """The fields of B runs; see `Rollouts`."""
 
     q: Annotated[np.ndarray, SAMPLED["q"].of_runs] | None
     v: Annotated[np.ndarray, SAMPLED["v"].of_runs] | None
@@ -73,36 +74,41 @@ class RolloutsData(RunData):
 
     @cached_property
     def diverged(self) -> np.ndarray:
-        """Whether each run ended by diverging, (B,)."""
+        """True for runs that diverged, (B,)."""
         return self._ended_by(Ending.DIVERGED)
 
     @cached_property
     def stopped(self) -> np.ndarray:
-        """Whether each run was interrupted, (B,)."""
+        """True for runs that were interrupted, (B,)."""
         return self._ended_by(Ending.STOPPED)
 
     def _ended_by(self, ending: Ending) -> np.ndarray:
         return np.array([end.ending is ending for end in self.ends])
 
     def outcome(self, run: int) -> Outcome:
-        """Return how a run ended; raises QueryError if no run has that number."""
+        """Return the outcome of a run; raises QueryError if no run has that number."""
         return self._outcome(integer("run", run, least=-len(self), most=len(self) - 1) % len(self))
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
-        """Outcome of each run, B of them, as in `simulate`; a run that diverged is judged when it is read first."""
+        """Outcomes of the B runs, same as in `simulate`; a run that diverged is judged on first access."""
         return tuple(map(self._outcome, range(len(self))))
 
     def _outcome(self, run: int) -> Outcome:
         if self.setup is None or self.ends[run].ending is not Ending.DIVERGED:
             return self.ends[run]
         if run not in self._judged:
-            self._judged[run] = reason_of(self.setup_of(run), self.ends[run], samples_of(self, run))
+            plant, controller = self._parts(self.setup, run)
+            start = {"q0": self.q0[run], "v0": self.v0[run]}
+            setup = with_values(
+                self.setup, {"plant": plant, "controller": controller, **start}
+            )  # checked before the run
+            self._judged[run] = reason_of(setup, self.ends[run], samples_of(self, run))
         return self._judged[run]
 
     @cached_property
     def _judged(self) -> dict[int, Outcome]:
-        """Outcomes by run, of those that diverged and were read."""
+        """Outcomes of runs that diverged, by run, as far as they were accessed."""
         return {}
 
     def setup_of(self, run: int) -> Setup:

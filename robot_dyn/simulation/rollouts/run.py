@@ -1,6 +1,6 @@
 """One run of a batch as a trajectory: the recorded quantities, and those computed from them and the setup.
 
-a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v;   nan where neither the record nor the setup determines a value
+a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v;   nan if neither the record nor the setup determines a value
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ def trajectory(runs: RolloutsData, run: int) -> Trajectory:
     """
     if runs.q is None or runs.v is None:
         raise QueryError("a run of rollouts is a trajectory if q and v were recorded: add them to record")
-    known = ~np.isnan(runs.q[run]).all(axis=1)  # a run that ended early has nan after its end
-    t, q, v = runs.t[known], runs.q[run, known], runs.v[run, known]
+    recorded = ~np.isnan(runs.q[run]).all(axis=1)  # a run that ended early has nan after its end
+    t, q, v = runs.t[recorded], runs.q[run, recorded], runs.v[run, recorded]
     setup = None if runs.setup is None else runs.setup_of(run)
-    a, u, power, energy = _follows(setup, runs.sources, t, q, v, None if runs.u is None else runs.u[run, known])
+    a, u, power, energy = _derived(setup, runs.sources, t, q, v, None if runs.u is None else runs.u[run, recorded])
     if runs.kinetic is not None and runs.potential is not None:
-        energy = np.column_stack([runs.kinetic[run, known], runs.potential[run, known]])
+        energy = np.column_stack([runs.kinetic[run, recorded], runs.potential[run, recorded]])
     work = {name: np.full(len(t), np.nan) for name in runs.sources}
     if runs.work is not None:
-        work = {name: x[run, known] for name, x in runs.work.items()}
+        work = {name: x[run, recorded] for name, x in runs.work.items()}
     about, of_setup = runs.about | {"run": f"{run} of {len(runs)}"}, Tracking()._asdict()
     if setup is not None:
         about |= settings_text(setup)
@@ -54,10 +54,10 @@ def trajectory(runs: RolloutsData, run: int) -> Trajectory:
     )  # fmt: skip
 
 
-def _follows(
+def _derived(
     setup: Setup | None, sources: tuple[str, ...], t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return acceleration, torque, powers and energies at the samples; nan where they are not known."""
+    """Return acceleration, torque, powers and energies at the samples; nan if unknown."""
     unknown, energy = np.full_like(q, np.nan), np.full((len(t), 2), np.nan)
     equation = None if setup is None else StateEquation(setup.plant, setup.controller)
     if equation is None or equation.equation_of_motion.state_size:  # torques depend on states that are not recorded

@@ -1,4 +1,4 @@
-"""The runs of a batch as columns, a row for each run: what was swept, how it ended, rms and extremes by joint."""
+"""The runs of a batch as columns, a row for each run: varied parameters, outcome, rms and extremes by joint."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robot_dyn.simulation.rollouts.sweepable import swept_parameter
 
 
 def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
-    """A number for each run; the rms is over the samples up to its end, extremes are over its steps."""
+    """Yield columns with a value for each run; the rms is over the samples up to its end, extremes over its steps."""
     types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
     yield Column("run", np.arange(len(runs)))
     yield from _of_parameters(runs, types)
@@ -29,9 +29,11 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     yield Column("outcome", np.array([end.ending.value for end in runs.ends]))
     yield Column("reason", np.array([outcome.reason.value for outcome in runs.outcomes]))
     yield Column("steps", runs.steps)
-    if of.tracking_error is not None:
+    if of.rms_tracking_error is not None:
         yield Column(
-            "tracking error", of.tracking_error, "m" if "frame" in runs.about else joint_units("q", types.values())
+            "rms tracking error",
+            of.rms_tracking_error,
+            "m" if "frame" in runs.about else joint_units("q", types.values()),
         )
     texts = texts_by_run(of.remarks, len(runs))
     yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))
@@ -45,8 +47,8 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
 
 
 def samples(runs: RolloutsData) -> dict[str, Variable]:
-    """What was recorded of the runs, over runs and sample times."""
-    kinds, found = joint_types(runs), dict[str, Variable]()
+    """Return the recorded quantities over runs and sample times."""
+    kinds, variables = joint_types(runs), dict[str, Variable]()
     for key, row in SAMPLED.items():
         values = getattr(runs, key, None)
         for name, x in values.items() if isinstance(values, dict) else (("", values),):
@@ -54,19 +56,19 @@ def samples(runs: RolloutsData) -> dict[str, Variable]:
                 over = ("t",) if key == "t" else ("run", "t", "joint")[: x.ndim]
                 about = {"units": joint_units(row.unit, kinds) if row.of_joints else row.unit, "long_name": row.title}
                 about |= {"long_name": f"{row.title} of {name}"} if name else {}
-                found[f"{key}_{name}" if name else key] = over, x, about
-    return found
+                variables[f"{key}_{name}" if name else key] = over, x, about
+    return variables
 
 
 def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
-    """What was swept: by joint, where its setup is known and says that it is of joints; else numbered if of several."""
+    """Yield the varied parameters: by joint if the setup declares them so, otherwise numbered if there are several."""
     setup = runs.setup
-    known = (
+    varied = (
         () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.params)
     )
-    declared = {each.name: each.declared for each in known if each.declared.of_joints}
+    declared = {parameter.name: parameter.declared for parameter in varied if parameter.declared.of_joints}
     dynamics = None if setup is None else setup.plant.dynamics
-    about = {each.name: swept_parameter(each, dynamics).unit for each in known}
+    about = {parameter.name: swept_parameter(parameter, dynamics).unit for parameter in varied}
     for name, values in runs.params.items():
         columns = values.T
         if name in declared and len(columns) == len(types):

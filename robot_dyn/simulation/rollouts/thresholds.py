@@ -1,4 +1,4 @@
-"""The thresholds of the runs of a batch, where coefficients may differ from run to run, and levels with them."""
+"""The thresholds of the runs of a batch, whose coefficients, and therefore levels, may differ from run to run."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from robot_dyn.simulation.setup.setup import Setup
 @final
 @dataclass(frozen=True, eq=False)
 class Thresholds:
-    """The thresholds of B runs, K of each.
+    """K thresholds of each of B runs.
 
     Attributes:
         rows, coordinates: See `LaneEvents`.
-        levels: Of each run, inf where it has none, (K, B).
-        functions: Number of the functions of the actuation.
-        others: Runs in which other parts have thresholds than in the compiled equation, (B,).
-        names: What the thresholds are, each once.
+        levels: Levels of each run, inf for none, (K, B).
+        functions: Number of functions of the actuation.
+        others: True for runs in which other parts have thresholds than in the compiled equation, (B,).
+        names: Distinct names of the thresholds.
     """
 
     rows: np.ndarray
@@ -43,15 +43,21 @@ class Thresholds:
 
     @property
     def some(self) -> np.ndarray:
-        """Whether each run has a threshold, (B,)."""
+        """True for runs that have a threshold, (B,)."""
         return np.isfinite(self.levels).any(axis=0) | self.others
 
     def of(self, runs: np.ndarray) -> Thresholds:
-        """The thresholds of some of the runs."""
+        """Return the thresholds of some of the runs."""
         return replace(self, levels=self.levels[:, runs], others=self.others[runs])
 
     def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LaneEvents:
-        """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
+        """Return the switching functions of some of the runs at their start.
+
+        Args:
+            runs: Numbers of the runs.
+            rows: Number of rows of a rate.
+            positions: Number of rows that are positions.
+        """
         events = lane_events(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
         events.until[self.others[runs]] = 0.0
         events.left[0] -= self.others[runs].sum()
@@ -59,14 +65,14 @@ class Thresholds:
 
 
 def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:
-    """Return the thresholds at which `simulate` cuts steps, of B runs of a setup; None where it cuts none.
+    """Return the thresholds at which `simulate` cuts steps, for B runs of a setup; None if it cuts no steps.
 
     Args:
-        setup: Of all runs.
+        setup: Setup of all runs.
         sweep: Values that differ from run to run, (B, size) by name.
-        count: B.
+        count: Number of runs, B.
     """
-    if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
+    if setup.steps > MOST_CUT or setup.method.nonsmooth:
         return None
     equation, names = setup.equation, dict[str, None]()
     levels, others = dict[tuple[bool, int, int], np.ndarray](), np.zeros(count, bool)
@@ -80,35 +86,39 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
     if not names:
         return None
     places = sorted(levels)
-    rows, coordinates = np.array([row for _, row, _ in places], np.int64), sum(not of for of, _, _ in places)
+    rows, coordinates = (
+        np.array([row for _, row, _ in places], np.int64),
+        sum(not is_function for is_function, _, _ in places),
+    )
     functions, stacked = len(equation.limited) * equation.plant.dynamics.n, [levels[place] for place in places]
     return Thresholds(rows, coordinates, np.reshape(stacked, (-1, count)), functions, others, tuple(names))
 
 
 def _places(switching: Switching) -> list[tuple[bool, int, int]]:
-    """Where each threshold is: whether of a function, its row, and which one of that row."""
+    """Return the place of each threshold: True if it is of a function, its row, and its number in that row."""
     places: list[tuple[bool, int, int]] = []
     for k, row in enumerate(switching.rows.tolist()):
-        function = k >= switching.coordinates
-        places.append((function, row, sum(each[:2] == (function, row) for each in places)))
+        is_function = k >= switching.coordinates
+        places.append((is_function, row, sum(place[:2] == (is_function, row) for place in places)))
     return places
 
 
 def _of_runs(
     equation: StateEquation, sweep: Mapping[str, np.ndarray], count: int
 ) -> Iterator[tuple[Switching, np.ndarray]]:
-    """Yield the thresholds of the runs, with the numbers of those that have them, (k,)."""
+    """Yield the distinct thresholds of the runs, with the numbers of the runs that have them, (k,)."""
     plant, controller = equation.plant, equation.controller
-    known = parameters(plant.dynamics, plant.effects, controller, sweep)
-    of = {("effect", i): effect for i, effect in enumerate(plant.effects)} | {CONTROLLER: controller}
-    parts = {x.part for x in known if x.name in sweep and x.part in of and not _always_smooth(of[x.part])}
-    known = [x for x in known if x.part in parts]
-    values, places = joined(known), {x.name: rows(known, x.name) for x in known if x.name in sweep}
+    varied = parameters(plant.dynamics, plant.effects, controller, sweep)
+    of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+    of[CONTROLLER] = controller
+    parts = {x.part for x in varied if x.name in sweep and x.part in of and not _always_smooth(of[x.part])}
+    varied = [x for x in varied if x.part in parts]
+    values, places = joined(varied), {x.name: rows(varied, x.name) for x in varied if x.name in sweep}
     groups: dict[Any, tuple[dict[Part, Any], list[int]]] = {}
     for run in range(count if parts else 1):
         for name, place in places.items():
             values[place] = sweep[name][run]
-        swept = {part: with_values(of[part], given) for part, given in split(known, values).items()}
+        swept = {part: with_values(of[part], new) for part, new in split(varied, values).items()}
         n = plant.dynamics.n
         declared = tuple(x.thresholds() if part == CONTROLLER else x.thresholds(n) for part, x in swept.items())
         groups.setdefault(declared, (swept, []))[1].append(run)
@@ -119,5 +129,5 @@ def _of_runs(
 
 
 def _always_smooth(part: Any) -> bool:
-    """Whether a part has no threshold, whatever its coefficients are."""
+    """Return True if a part has no threshold for any coefficients."""
     return type(part).thresholds in (smooth, Effect.thresholds, Controller.thresholds)

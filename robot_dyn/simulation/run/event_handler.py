@@ -23,12 +23,11 @@ from robot_dyn.simulation.events.event_table import EventTable
 from robot_dyn.simulation.events.mode_change import change_mode
 from robot_dyn.simulation.events.regions import add_region, regions_of
 from robot_dyn.simulation.events.switching import Switching
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.run.event_loop import Events
 from robot_dyn.simulation.run.outcome import Accumulation, Outcome, Reason
 from robot_dyn.simulation.run.state import RunState
 from robot_dyn.simulation.run.watch import DivergedError
-from robot_dyn.simulation.setup.setup import STEP_S, Setup
+from robot_dyn.simulation.setup.setup import Setup
 
 _BRIEF = 1e-9  # part of a run: events of one joint within it chatter
 _MOST_CHANGES = 1000  # of the mode within the part _BRIEF of a run: no motion between them is resolved
@@ -88,7 +87,7 @@ class EventHandler:
         index = self.switching.number(index)
         if index < len(thresholds):
             self._add(self.switching.occurrence(index, t, y, side))
-            if self.state.setup.integrator.needs_jacobian:
+            if self.state.setup.method.needs_jacobian:
                 self.control.next_h[0] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
             if self._chatters():
                 self._drop(thresholds[index])
@@ -128,7 +127,7 @@ class EventHandler:
         self._forget_regions()
         self.take_log()
         self._renew_table(t)
-        if state.setup.integrator.needs_jacobian:
+        if state.setup.method.needs_jacobian:
             self.control.next_h[0] = 0.0
         self._apply_mode()
 
@@ -214,23 +213,12 @@ class EventHandler:
         motion = self.state.equation.equation_of_motion
         excludes_time_stepping = motion.payloads or motion.drives
         if excludes_time_stepping or not self.may_replace:
-            soft, stepping = "soft stops and regularised friction", "integrator='time_stepping' and a step_s"
+            soft, stepping = "soft stops and regularised friction", "method='MoreauJean' and a step_s"
             remedy = soft if excludes_time_stepping else stepping
             facts = {"changes": len(mode.changes), "span_s": span, "remedy": remedy}
             raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))
-        return Accumulation(
-            Remark(
-                kind=RemarkKind.ACCUMULATE,
-                joint=joint,
-                quantity="v",
-                start=first,
-                duration=t - first,
-                at=t,
-                value=float(np.abs(y[self.state.config.n : 2 * self.state.config.n]).max()),
-                limit=None,
-                facts={"changes": len(mode.changes), "span_s": span, "step_s": STEP_S},
-            )
-        )
+        speed = float(np.abs(y[self.state.config.n : 2 * self.state.config.n]).max())
+        return Accumulation(joint, first, t, speed, len(mode.changes), span)
 
     def _unsettled(self, t: float, contacts: Contacts) -> DivergedError:
         """Return the end of a run whose contact problem has no solution that the solver finds."""

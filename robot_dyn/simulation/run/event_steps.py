@@ -7,7 +7,7 @@ the right-hand side is smooth within a step.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, cast, final
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.step_control import ControlledStepper, StepControl, initial_control
 from robot_dyn.simulation.dynamics.loop_state import Ended, LoopConfig, loop_config
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -107,7 +108,7 @@ class EventSteps:
         except RobotDynError as error:
             if is_mistake(error):
                 raise
-            if not state.setup.integrator.controls_error:
+            if not state.setup.method.controls_error:
                 self._review_step()
             raise DivergedError(Outcome(Reason.CANNOT_EVALUATE, self.time, facts={"error": str(error)})) from None
         finally:
@@ -122,7 +123,7 @@ class EventSteps:
             samples = state.records.t[: int(state.position.sample_row[0])]
             times = [0.0, *samples, *(event.t for event in state.events)]
             t = float(max(time for time in times if time <= state.setup.duration_s))
-            if not state.setup.integrator.controls_error:
+            if not state.setup.method.controls_error:
                 raise state.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
             raise DivergedError(Outcome(Reason.STATE_OVERFLOWS, t, facts={"largest": inf}))
         if t > self.past_horizon + state.setup.duration_s / _COMPARED:
@@ -138,7 +139,7 @@ class EventSteps:
             state.tick()
         elif ended is Ended.ENERGY_GROWS:
             state.watch.look(t, y)
-        elif ended is Ended.TOO_SMALL and not state.setup.integrator.controls_error:
+        elif ended is Ended.TOO_SMALL and not state.setup.method.controls_error:
             self._review_step()
         elif ended is not Ended.PAUSED:
             raise DivergedError(self._failure(ended, t, y))
@@ -176,7 +177,7 @@ class EventSteps:
         state, t, y, equation = self.state, self.time, self.state.y, self._equation
         p, functions = state.table.parameters[state.segment], interpreted(equation, state.watch)
         right_side = system(functions, equation, p, state.lanes.run_parameters[: state.config.held])
-        one_step(state.setup.integrator, right_side, t, y, float(self.control.h[0]), state.watch)
+        one_step(cast(Integrator, state.setup.method), right_side, t, y, float(self.control.h[0]), state.watch)
         raise state.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
 
     def _widen(self) -> None:
@@ -195,7 +196,7 @@ class EventSteps:
         ends = records.step_log_t[:steps]
         states = np.vstack([self.state.start, records.step_log[: min(steps, len(records.step_log))]])
         path = Path(np.full(len(states), -1), np.append(0.0, ends)[: len(states)], states)
-        if not setup.integrator.controls_error:
+        if not setup.method.controls_error:
             return _on(nodes(setup.segments), path), path, ends
         return Path(np.arange(shared), records.shared_t[:shared], records.shared[:shared]), path, ends
 
@@ -209,7 +210,7 @@ def _on(times: np.ndarray, path: Path) -> Path:
 
 def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> tuple[ControlledStepper, StepControl]:
     """Return the stepper of the method, and the control of its steps before the first."""
-    method: Any = setup.integrator
+    method: Any = setup.method
     n, m, ends = equation.plant.dynamics.n, equation.size, np.zeros(0) if mesh is None else mesh
     if not method.controls_error:
         stepper = hermite.stepper(method, m, n, m + n, equation.widths)
@@ -224,8 +225,8 @@ def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> t
 
 def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
     """Return the settings of the loop, with the times of samples and of shared states."""
-    controls_error, every = setup.integrator.controls_error, not setup.record_period_s
-    period = setup.record_period_s or (setup.duration_s / _SAMPLES if controls_error else inf)
+    controls_error, every = setup.method.controls_error, not setup.record_every_s
+    period = setup.record_every_s or (setup.duration_s / _SAMPLES if controls_error else inf)
     share_period = setup.duration_s / _COMPARED if controls_error and setup.estimate_error else inf
     return loop_config(
         setup.equation,
@@ -235,7 +236,7 @@ def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
         samples_nodes=samples and every,
         samples_steps=samples and every and not controls_error,
         duration=float(setup.duration_s),
-        restarts=setup.integrator.needs_jacobian,
+        restarts=setup.method.needs_jacobian,
     )
 
 

@@ -43,7 +43,7 @@ class FixedSteps:
     def __init__(self, state: RunState, pace: Fraction) -> None:
         setup, counts, m, n = state.setup, state.table.counts, state.equation.size, state.config.n
         self.state, self.segments = state, paced(setup.segments, pace)
-        self.method = cast(Integrator, setup.integrator)
+        self.method = cast(Integrator, setup.method)
         self.stepper = self.method.stepper(FLOAT64, m, n, m + n, 1, state.equation.widths)
         self.loop = state.engine.loop() or time_loop(self.stepper.step)
         every, thin = _shared(setup, pace, len(counts))
@@ -51,7 +51,7 @@ class FixedSteps:
             largest=min(state.engine.doubtful, LARGEST),
             every=every,
             thin=thin,
-            sample_period=float(setup.record_period_s or 0.0),
+            sample_period=float(setup.record_every_s or 0.0),
             sample_slack=ON_STEP * setup.nominal_step_s,
         )
         state.position.sample_time[0] = 0.0 if pace == 1 else inf
@@ -149,4 +149,4 @@ def _shared(setup: Setup, pace: Fraction, segments: int) -> tuple[int, int]:
 def samples_at_most(setup: Setup, counts: np.ndarray) -> int:
     """Return the largest possible number of samples, for the numbers of steps in the segments."""
     steps = int(counts.sum())
-    return min(steps, int(setup.duration_s / setup.record_period_s) + 2) if setup.record_period_s else steps
+    return min(steps, int(setup.duration_s / setup.record_every_s) + 2) if setup.record_every_s else steps

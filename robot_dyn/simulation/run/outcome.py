@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import final
 
-from robot_dyn.simulation.observation.remarks import Parts, Remark, RemarkKind, line_parts, sentence
+from robot_dyn.foundations.sentences import Parts, prefixed, sentence
+from robot_dyn.simulation.dynamics.fastest_motion import MOTION, Fastest
+from robot_dyn.simulation.observation.remarks import RemarkKind, line_parts
 
 
 class Ending(StrEnum):
@@ -79,7 +81,7 @@ class Reason(StrEnum):
     STALLED = "stalled"
     """Error control takes steps so short that the rest of the run would need more than 1e7 of them: it is stiff.
 
-    Take Rosenbrock, softer effects or a larger tolerance.
+    Take Rodas5P, softer effects or a larger tolerance.
     """
 
     STAGES_NOT_FOUND = "stages_not_found"
@@ -91,7 +93,7 @@ class Reason(StrEnum):
     EVENTS_ACCUMULATE = "events_accumulate"
     """Impacts or changes between sliding and sticking follow each other in ever shorter times.
 
-    Take `integrator="time_stepping"` with a step, or soft stops and regularised friction.
+    Take `method="MoreauJean"` with a step, or soft stops and regularised friction.
     """
 
     TORQUE_NOT_FINITE = "torque_not_finite"
@@ -168,7 +170,7 @@ _SENTENCES: Mapping[Reason, Parts] = {
     Reason.STALLED: (
         "stalled: the last {steps} steps advanced {advanced_s:.1e} s, {remaining:.0e} more would be needed: the system "
         "is stiff",
-        "; {motion}",
+        prefixed("; ", MOTION),
         ": take {remedy}",
         _BENDS,
     ),
@@ -195,17 +197,37 @@ class TooLong:
 @final
 @dataclass(frozen=True)
 class Stiff:
-    """A run by an explicit method gives up: a stiff method is faster, for the reason of the remark."""
+    """A run by an explicit method gives up: stability limits its steps, and a stiff method is faster.
 
-    remark: Remark
+    Attributes:
+        t: Time reached, in [s].
+        motion: The fastest motion there.
+    """
+
+    t: float
+    motion: Fastest
 
 
 @final
 @dataclass(frozen=True)
 class Accumulation:
-    """A run gives up because its events accumulate, as the remark says: time stepping is to make it."""
+    """A run gives up because its events accumulate: time stepping continues it.
 
-    remark: Remark
+    Attributes:
+        joint: Name of the joint of the last event.
+        start: Time of the first of these events, in [s].
+        t: Time reached, in [s].
+        speed: Largest speed of a joint there, in [rad/s] or [m/s].
+        changes: Number of changes of mode.
+        span_s: Time between the first and the last of them, in [s].
+    """
+
+    joint: str
+    start: float
+    t: float
+    speed: float
+    changes: int
+    span_s: float
 
 
 GivesUp = TooLong | Stiff | Accumulation

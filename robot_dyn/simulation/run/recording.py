@@ -46,7 +46,7 @@ class Recording:
         outcome: The end of the run.
         t: Times of the samples, (k,), in [s].
         y: States of the state equation, (k, m).
-        made: y', u, K and V at the samples, (k, m + n + 2).
+        sampled: y', u, K and V at the samples, (k, m + n + 2).
         shared: States at which runs of other steps are compared.
         step_log: States at the ends of all steps; the same as `shared` unless the method chooses its steps.
         steps: Number of steps.
@@ -59,7 +59,7 @@ class Recording:
     outcome: Outcome
     t: np.ndarray
     y: np.ndarray
-    made: np.ndarray
+    sampled: np.ndarray
     shared: Path
     step_log: Path
     steps: int

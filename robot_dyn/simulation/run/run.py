@@ -76,7 +76,7 @@ class Run:
             self.state = RunState(setup, engine, table, observer)
             self.steps: FixedSteps | EventSteps = FixedSteps(self.state, cast(Fraction, pace))
             return
-        if setup.integrator.controls_error:
+        if setup.method.controls_error:
             ends = pace if isinstance(pace, np.ndarray) else None
         else:
             ends = mesh(setup.segments, cast(Fraction, pace))
@@ -168,7 +168,7 @@ class Run:
             outcome=outcome,
             t=records.t[:rows],
             y=records.y[:rows, :, 0],
-            made=records.sampled[:rows, :, 0],
+            sampled=records.sampled[:rows, :, 0],
             shared=shared,
             step_log=step_log,
             steps=int(state.position.steps[0]),
@@ -177,7 +177,7 @@ class Run:
             events=tuple(event for event in state.events if event.t <= outcome.t),  # not those of states that overflow
             ends=ends,
         )
-        if state.setup.integrator.nonsmooth:
+        if state.setup.method.nonsmooth:
             _complete_samples(state, recording)
         return recording
 
@@ -185,6 +185,6 @@ class Run:
 def _complete_samples(state: RunState, recording: Recording) -> None:
     """Write the rates at samples that machine code leaves out: which joints rest, the equation must find."""
     m, n = state.equation.size, state.config.n
-    for t, y, made in zip(recording.t, recording.y, recording.made, strict=True):
-        if np.isnan(made[:m]).all():
-            sample(state.equation, float(t), y, made[m : m + n].copy() if state.config.held else None, made)
+    for t, y, sampled in zip(recording.t, recording.y, recording.sampled, strict=True):
+        if np.isnan(sampled[:m]).all():
+            sample(state.equation, float(t), y, sampled[m : m + n].copy() if state.config.held else None, sampled)

@@ -99,11 +99,11 @@ class Watch:
         made, self.paced, self.looked = t - self.paced, t, steps
         ahead = (self.setup.duration_s - t) / max(made, 1e-300) * since
         if ahead > _MOST_AHEAD:
-            implicit = "" if self.setup.integrator.name == "Rosenbrock" else "Rosenbrock, "
+            implicit = "" if self.setup.method.name == "Rodas5P" else "Rodas5P, "
             facts: dict[str, float | str] = {"steps": since, "advanced_s": made, "remaining": ahead}
             facts["remedy"] = f"{implicit}softer effects or a larger tolerance"
             motion = self._fastest(t, y, made / since)
-            facts |= {"motion": str(motion)} if motion else {}
+            facts |= motion.facts if motion else {}
             joint = motion.joint if motion else ""
             raise DivergedError(Outcome(Reason.STALLED, t, joint, facts | self._steepest()))
 
@@ -143,4 +143,5 @@ class Watch:
 def step_and_period(setup: Setup) -> dict[str, float | str]:
     """Return the step and, of a sampled loop, the control period: the facts about a run that diverged."""
     period_s = 0.0 if setup.controller is None else setup.controller.period_s
-    return {"step_s": setup.taken_step_s} | ({"period_s": period_s} if period_s else {})
+    facts: dict[str, float | str] = {"step_s": setup.taken_step_s}
+    return facts | {"period_s": period_s} if period_s else facts

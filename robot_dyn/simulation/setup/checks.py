@@ -1,4 +1,4 @@
-"""Checks of a setup: that its parts fit each other and the method, and have an answer at the start."""
+"""Checks of a setup: its parts fit each other and the method, and can be evaluated at the start."""
 
 from __future__ import annotations
 
@@ -14,39 +14,44 @@ from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
 from robot_dyn.foundations.validate import Kind, float64, number
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.setup.schedule import MOST_CUT
 
 _UNITS = ("rad", "m")
+Method = Integrator | Adaptive
+Accuracy = float | Mapping[str, float]
+"""A requested accuracy: one number for rad and m, or a number for each unit."""
 
 
-def check_method(plant: Plant, method: Any, events: tuple[Event, ...], finds_events: bool) -> None:
-    """Check that a method can integrate what moves, and find events.
+def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_events: bool) -> None:
+    """Check that a method can integrate a plant and can locate the events.
 
     Raises:
-        QueryError: If the method cannot.
+        QueryError: If it cannot; names the part or event and a method that can.
     """
     if events and not finds_events:
         raise QueryError(
-            f"events: steps of {method.name} are not cut; take integrator='DOP853'"
+            f"events: steps of {method.name} are not cut; take method='DOP853'"
             if method.nonsmooth
             else f"events: runs of more than {MOST_CUT} steps of {method.name} are not cut; take longer"
-            " steps, or integrator='DOP853'"
+            " steps, or method='DOP853'"
         )
     _check_set_valued(plant, method, finds_events)
     _check_payloads(plant, method)
     if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
-        raise QueryError(f"{drives[0].name}: {method.name} takes no motors of a drive; take integrator='DOP853'")
+        raise QueryError(f"{drives[0].name}: {method.name} takes no motors of a drive; take method='DOP853'")
 
 
 def check_start(
     plant: Plant, controller: Controller | None, events: tuple[Event, ...], q0: np.ndarray, v0: np.ndarray
 ) -> None:  # fmt: skip
-    """Check that effects, controller and events have an answer at the start, between rigid stops.
+    """Check that effects, controller and events can be evaluated at the start, and that no stop is penetrated.
 
     Raises:
-        QueryError: If the start is beyond a stop, or an event returns no number.
+        QueryError: If the start is beyond a stop, or an event does not return a finite number.
         EffectError, ControlError: If an effect or the controller does not return one number for each joint.
     """
     check_stops(plant, q0)
@@ -57,76 +62,79 @@ def check_start(
         value = call(event.function, 0.0, q0, v0)
         if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
-    nothing = np.zeros(plant.dynamics.n)
-    plant.actuation(nothing)
-    with suppress(OverflowedError):  # a start so far out is the outcome of a run
-        plant.forward_dynamics(0.0, q0, v0, nothing)  # a singular M is reported here
+    no_torque = np.zeros(plant.dynamics.n)
+    plant.actuation(no_torque)
+    with suppress(OverflowedError):  # an overflow at the start is an outcome of the run, not a mistake
+        plant.forward_dynamics(q0, v0, no_torque, t=0.0)  # a singular M is reported here
 
 
 def check_model(plant: Dynamics, controller: Controller, q0: np.ndarray) -> None:
-    """Check that a controller means the joints and links of the plant; a file with only other names may fit too."""
+    """Check that the models of a controller have the joints of the plant, in its order, and its task frame.
+
+    A model that shares no joint name with the plant is accepted: it may be the same arm under other names.
+    """
     for model in controller.models.values():
         pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
-        if not any(of_model in plant.joint_names for of_model, _ in pairs):
+        if not any(name in plant.joint_names for name, _ in pairs):
             continue
-        for of_model, name in pairs:
-            if of_model != name:
+        for name, plant_name in pairs:
+            if name != plant_name:
                 raise QueryError(
-                    f"the controller's model has the joint {of_model!r} where the plant has {name!r}; lock the same"
+                    f"the controller's model has the joint {name!r} where the plant has {plant_name!r}; lock the same"
                     " joints of both"
                 )
     if controller.task_frame is not None:
-        plant.placement(q0, controller.task_frame)  # so that an unknown link is reported here
+        plant.placement(q0, controller.task_frame)  # raises an error for an unknown link
 
 
-def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
+def check_stops(plant: Plant, q0: Array, name: str = "q0") -> None:
     """Check that a start is not beyond a rigid stop.
 
     Raises:
-        QueryError: If it is; names the joint, and by `of` the start.
+        QueryError: If it is; names the joint, the depth and the start, which is called `name`.
     """
-    for each in plant.effects:
-        if isinstance(each, RigidStops) and (depth := each.penetration(q0)).any():
+    for effect in plant.effects:
+        if isinstance(effect, RigidStops) and (depth := effect.penetration(q0)).any():
             i = int(np.argmax(depth))
-            name, which = plant.dynamics.joint_names[i], "lower" if each.touched(q0)[i] < 0 else "upper"
-            raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
+            joint, which = plant.dynamics.joint_names[i], "lower" if effect.touched(q0)[i] < 0 else "upper"
+            raise QueryError(f"{name}: {joint!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
 
 
-def _check_set_valued(plant: Plant, method: Any, finds_events: bool) -> None:
-    """Check that steps can end where joints are held and let go."""
+def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
+    """Check that the steps of a method can end where dry friction, stops or backlash hold or release a joint."""
     effects = plant.equation_of_motion.set_valued
-    for fails, why in (
+    for is_unsuited, reason in (
         (method.canonical, "integrates momenta"),
-        (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
+        (isinstance(method, Integrator) and method.order < 2, "is of order 1, too low to find where"),
         (not finds_events, f"takes more than {MOST_CUT} steps"),
     ):
-        if effects and fails and not method.nonsmooth:
+        if effects and is_unsuited and not method.nonsmooth:
             raise QueryError(
-                f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {why};"
-                " take integrator='DOP853', or 'time_stepping' with a step_s"
+                f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {reason};"
+                " take method='DOP853', or 'MoreauJean with a step_s"
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
-        raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
+        raise QueryError(f"{other[0].name}: has no law for {method.name}; take method='DOP853'")
 
 
-def _check_payloads(plant: Plant, method: Any) -> None:
-    """Check that the state is one of velocities where payloads come and go."""
-    for fails, why in (
+def _check_payloads(plant: Plant, method: Method) -> None:
+    """Check that a method can continue after a payload has been picked up or dropped."""
+    for is_unsuited, reason in (
         (method.canonical, f"what is picked up or dropped changes momenta, which {method.name} integrates"),
         (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
     ):
-        if plant.equation_of_motion.payloads and fails:
-            raise QueryError(f"carried_payload: {why}; take integrator='DOP853'")
+        if plant.equation_of_motion.payloads and is_unsuited:
+            raise QueryError(f"carried_payload: {reason}; take method='DOP853'")
 
 
 def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:
-    """Check that what each effect returns at the start is one number for each joint."""
+    """Check that each effect returns one finite number for each joint, and for each of its states, at the start."""
     dynamics, equation = plant.dynamics, plant.equation_of_motion
     with np.errstate(all="ignore"):
         torques = equation.torques(0.0, q0, v0)
         for force, torque in zip(plant.forces, torques, strict=True):
             _check_returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
-            if any(each.of_actuation for each in force.thresholds(dynamics.n)):
+            if any(threshold.of_actuation for threshold in force.thresholds(dynamics.n)):
                 raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
         u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
         u, reached = equation.applied(u, z)
@@ -137,44 +145,44 @@ def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:
 
 
 def _check_control(controller: Controller, q0: Array, v0: Array) -> None:
-    """Check that what the controller returns at the start is one number for each joint, and for each of its states."""
-    with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
+    """Check that the controller returns one finite number for each joint, and for each of its states, at the start."""
+    with np.errstate(all="ignore"), suppress(OverflowedError):  # an overflow of its model is an outcome of the run
         start = 0.0, q0, v0, np.zeros(controller.state_size)
         torque = call(controller.torque, *start)
         _check_returned(f"{controller.name}.torque", torque, controller.n, error=ControlError)
         if controller.state_size:
             after = controller.next_state if controller.period_s else controller.state_rate
-            what = f"{controller.name}.{after.__name__}"
-            _check_returned(what, call(after, *start), controller.state_size, "state", error=ControlError)
+            name = f"{controller.name}.{after.__name__}"
+            _check_returned(name, call(after, *start), controller.state_size, "state", error=ControlError)
 
 
-def least_accuracy(given: Any, dynamics: Dynamics) -> float:
-    """Return the requested accuracy as one number: the least of those for the units that the joints have.
+def least_accuracy(accuracy: Accuracy, dynamics: Dynamics) -> float:
+    """Return the requested accuracy as one number: the smallest of those for the units of the joints.
 
     Raises:
         QueryError: If it is not a positive number, or lacks the unit of a joint.
     """
-    if not isinstance(given, Mapping):
-        return number("accuracy", given, above=0)
-    if unknown := [name for name in given if name not in _UNITS]:
+    if not isinstance(accuracy, Mapping):
+        return number("accuracy", accuracy, above=0)
+    if unknown := [name for name in accuracy if name not in _UNITS]:
         raise QueryError(f"accuracy: no unit {shown(unknown[0])}; give 'rad', 'm' or both")
     kinds = getattr(getattr(dynamics, "robot", dynamics), "joint_types", None)
     slides = [None] if kinds is None else [kind == "prismatic" for kind in kinds]
     units = [unit for unit, slide in zip(_UNITS, (False, True), strict=True) if slide in slides or None in slides]
-    if missing := [unit for unit in units if unit not in given]:
-        raise QueryError(f"accuracy: none is given for joints in {missing[0]}, got {shown(dict(given))}; add it")
-    return min(number(f"accuracy in {unit}", given[unit], above=0) for unit in units)
+    if missing := [unit for unit in units if unit not in accuracy]:
+        raise QueryError(f"accuracy: there is no value for joints in {missing[0]}, got {shown(dict(accuracy))}; add it")
+    return min(number(f"accuracy in {unit}", accuracy[unit], above=0) for unit in units)
 
 
-def _check_returned(what: str, values: Any, n: int, of: str = "joint", *, error: Kind) -> None:
-    """Raise the error unless a function returned n finite numbers, shape (n,); `what` is its name."""
+def _check_returned(name: str, values: Any, n: int, row: str = "joint", *, error: Kind) -> None:
+    """Raise the error unless `values`, which the function `name` returned, are finite numbers of shape (n,)."""
     try:
         array = float64(values)
-        found = f"shape {array.shape}" if array.shape != (n,) else ""
-        if not (found or np.isfinite(array).all()):
-            found = str(array[~np.isfinite(array)][0])
-    except ValueError as problem:
-        found = str(problem)
-    if found:
-        count = f"{n} {of}{'s' if n > 1 else ''}"
-        raise error(f"{what} returned {found} for {count} at the start; it must be finite numbers of shape ({n},)")
+        problem = f"shape {array.shape}" if array.shape != (n,) else ""
+        if not (problem or np.isfinite(array).all()):
+            problem = str(array[~np.isfinite(array)][0])
+    except ValueError as failure:
+        problem = str(failure)
+    if problem:
+        count = f"{n} {row}{'s' if n > 1 else ''}"
+        raise error(f"{name} returned {problem} for {count} at the start; it must be finite numbers of shape ({n},)")

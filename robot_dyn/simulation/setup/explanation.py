@@ -1,4 +1,4 @@
-"""The control of a setup in words: its law, parts, models and references."""
+"""The control of a setup in words: law, parts, models and references."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.loop import SIGNALS, Loop
 from robot_dyn.control.reference import Reference
 from robot_dyn.effects.explanation import as_they_act, edit_terms
+from robot_dyn.queries.dynamics import Dynamics
 
 
 def law(controller: Controller) -> str:
-    """The control law in short form."""
+    """Return the control law in short form."""
     return controller.term or f"{controller.name}(t, q, v, z)"
 
 
 def pace(period_s: float) -> str:
-    """How often a controller acts."""
+    """Return the words for the period of a controller: continuous for 0 s."""
     return f"every {period_s:g} s, constant between" if period_s else "continuously"
 
 
-def control_lines(controller: Controller, dynamics: Any) -> Iterator[str]:
-    """A controller and its parts, line by line."""
+def control_lines(controller: Controller, dynamics: Dynamics) -> Iterator[str]:
+    """Yield the lines about a controller, its parts, its models and its references."""
     inside = controller.controller if isinstance(controller, Loop) else controller
     yield f"control: {inside.name}, {pace(controller.period_s)}"
     yield from (f"  {text}" for text in as_they_act([inside], dynamics))
@@ -35,11 +36,11 @@ def control_lines(controller: Controller, dynamics: Any) -> Iterator[str]:
             texts = as_they_act([part], dynamics, SIGNALS.get(line, ""))
             yield f"  {line}: {'; '.join((f'{part.name}, {part.term}' if part.term else part.name, *texts))}"
     yield from model_lines(controller, dynamics)
-    yield from (f"reference: {type(each).__name__}, {span(each)}" for each in controller.references.values())
+    yield from (f"reference: {type(x).__name__}, {span(x)}" for x in controller.references.values())
 
 
-def model_lines(controller: Controller, dynamics: Any) -> Iterator[str]:
-    """The models of the arm that a controller has, each with the edits in which it differs from the plant."""
+def model_lines(controller: Controller, dynamics: Dynamics) -> Iterator[str]:
+    """Yield a line for each model of the arm in a controller, with the edits in which it differs from the plant."""
     for path, model in controller.models.items():
         more, less = (list(dict.fromkeys(x)) for x in _differing_edits(model, dynamics))
         differ = [*more, *(f"without {text}" for text in less)]
@@ -49,15 +50,15 @@ def model_lines(controller: Controller, dynamics: Any) -> Iterator[str]:
 
 
 def _differing_edits(model: Any, dynamics: Any) -> tuple[list[str], list[str]]:
-    """Edits that the model has and the robot of the plant has not, and the reverse."""
-    model, plant = (getattr(each, "robot", each) for each in (model, dynamics))
+    """Return the edits that only the model has, and those that only the robot of the plant has."""
+    model, plant = (getattr(x, "robot", x) for x in (model, dynamics))
     if not (hasattr(model, "edits") and hasattr(plant, "edits")):
         return ([], []) if model is plant else (["not a robot of a file"], [])
-    own, others = (
-        [f"{term.kind} {text}" for term in edit_terms(each.edits) for text in term.coefficients]
-        for each in (model, plant)
+    in_model, in_plant = (
+        [f"{term.kind} {text}" for term in edit_terms(robot.edits) for text in term.coefficients]
+        for robot in (model, plant)
     )
-    more, less = [x for x in own if x not in others], [x for x in others if x not in own]
+    more, less = [x for x in in_model if x not in in_plant], [x for x in in_plant if x not in in_model]
     if model.description.source != plant.description.source:
         more.insert(0, "of another file")
     elif not more and not less and model.edits != plant.edits:
@@ -66,7 +67,7 @@ def _differing_edits(model: Any, dynamics: Any) -> tuple[list[str], list[str]]:
 
 
 def span(reference: Reference) -> str:
-    """When a reference begins and ends, and its duration."""
+    """Return the start, the end and the duration of a reference, in words."""
     pieces = reference.polynomials.values()
-    start, end = min(each.start for each in pieces), max(each.end for each in pieces)
+    start, end = min(piece.start for piece in pieces), max(piece.end for piece in pieces)
     return f"{start:g} to {end:g} s, {end - start:g} s long" if end > start else "constant"

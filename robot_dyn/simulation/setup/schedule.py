@@ -1,7 +1,7 @@
-"""The schedule of a run: segments of time without ticks or switches inside, and the steps on each.
+"""The schedule of a run: segments of time without ticks or switches inside, and the steps of each segment.
 
-A companion run takes steps of another length on the same segments. Every step ends at a whole number of steps of the
-run, or of parts of one, so that both pass common times.
+A companion run takes longer or shorter steps on the same segments. The ratio of both steps is a whole number or one
+over a whole number, so that run and companion reach common times.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy as np
 
 from robot_dyn.foundations.errors import QueryError
 
-MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
-LEAST_STEPS = 3  # on a segment: fewer leave no room for a longer step
-ULPS = 4  # times that differ by no more units in the last place are one
-ON_STEP = 1e-9  # of step_s: a sample that lies so near to the end of a step is taken there
-_ROUNDED = 1e-9  # of the period: k · period, as computed, is the time that the user wrote
+MOST_CUT = 200_000  # steps of a run of fixed step whose steps may end at events
+LEAST_STEPS = 3  # on a segment: with fewer, a companion run cannot take longer steps
+ULPS = 4  # times that differ by at most so many units in the last place are equal
+ON_STEP = 1e-9  # of step_s: a sample this close to the end of a step is taken there
+_ROUNDED = 1e-9  # of the period: tolerance for the rounding of k · period
 
 
 @final
@@ -30,12 +30,12 @@ class Segment:
     """A segment of the run without ticks or switches inside.
 
     Attributes:
-        start: In [s].
-        end: In [s].
-        tick: Whether a sampled controller acts at its start.
+        start: Time at the start, in [s].
+        end: Time at the end, in [s].
+        tick: True if a sampled controller acts at the start.
         steps: Number of steps.
-        first: Number of steps of the run, not of a companion, before its start.
-        pace: Length of its steps, in steps of the run.
+        first: Number of steps before the start, counted in steps of the run also for a companion.
+        pace: Length of a step, in steps of the run.
     """
 
     start: float
@@ -49,16 +49,16 @@ class Segment:
 def cuts(
     duration_s: float, period_s: float, switches: Iterable[float], instants: tuple[float, ...] = (0.0,)
 ) -> list[tuple[float, bool]]:
-    """Times at which segments start, and whether each is a tick; the last is the end of the run.
+    """Return the times at which segments start, with True for ticks; the last time is the end of the run.
 
-    A switch keeps its exact time. A tick, whose time is the rounded product k · period, moves onto a switch, or onto
-    the end, that lies within rounding of it.
+    Switches keep their exact times. The time of a tick is the rounded product k · period: if a switch or the end of
+    the run lies within rounding of it, the tick moves there.
 
     Args:
         duration_s: Length of the run, in [s].
-        period_s: Period of a sampled controller, in [s]; 0 for none.
-        switches: Times at which something switches, in [s].
-        instants: Parts of a period at which there is a tick, ascending from 0.
+        period_s: Period of a sampled controller, in [s]; 0 without one.
+        switches: Times at which effects or references switch, in [s].
+        instants: Times of the ticks within a period, as fractions of the period, ascending from 0.
 
     Raises:
         QueryError: If two switches lie so close together that no segment fits between them.
@@ -82,30 +82,33 @@ def cuts(
 
 
 def near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """The entry of ascending `fixed` nearest to each of t."""
+    """Return the entry of the ascending array `fixed` that is nearest to each entry of t."""
     right = np.clip(np.searchsorted(fixed, t), 1, len(fixed) - 1)
     return np.where(t - fixed[right - 1] < fixed[right] - t, fixed[right - 1], fixed[right])
 
 
-def steps_on(length: float, step_s: float, record_period_s: float) -> int:
-    """Number of steps on a segment; where it holds whole record periods, each of them has the same number."""
-    periods = round(length / record_period_s) if record_period_s else 0
-    if periods and abs(length / record_period_s - periods) < _ROUNDED:
-        return periods * max(1, ceil(record_period_s / step_s - _ROUNDED))
+def steps_on(length: float, step_s: float, record_every_s: float) -> int:
+    """Return the number of steps on a segment; if it consists of whole record periods, these have equal steps."""
+    periods = round(length / record_every_s) if record_every_s else 0
+    if periods and abs(length / record_every_s - periods) < _ROUNDED:
+        return periods * max(1, ceil(record_every_s / step_s - _ROUNDED))
     return max(1, ceil(length / step_s - _ROUNDED))
 
 
 def nodes(segments: tuple[Segment, ...]) -> np.ndarray:
-    """Ends of all steps, the start among them, in [s]."""
-    parts = [each.start + np.arange(each.steps) * ((each.end - each.start) / each.steps) for each in segments]
+    """Return the start of the run and the ends of all its steps, in [s]."""
+    parts = [x.start + np.arange(x.steps) * ((x.end - x.start) / x.steps) for x in segments]
     return np.concatenate([*parts, [segments[-1].end]])
 
 
 def mesh(segments: tuple[Segment, ...], pace: Fraction) -> np.ndarray:
-    """Ends of steps `pace` times as long, a whole number or one over it; of the former each is one of `nodes`."""
+    """Return the ends of steps `pace` times as long, in [s]; if pace ≥ 1, each of them is one of `nodes`.
+
+    pace is a whole number or one over a whole number.
+    """
     times = nodes(segments)
     if pace >= 1:
-        firsts = np.array([each.first for each in segments])
+        firsts = np.array([segment.first for segment in segments])
         place = np.arange(len(times)) - firsts[np.searchsorted(firsts, np.arange(len(times)), side="right") - 1]
         return times[place % int(pace) == 0]
     parts = int(1 / pace)
@@ -114,19 +117,19 @@ def mesh(segments: tuple[Segment, ...], pace: Fraction) -> np.ndarray:
 
 
 def paced(segments: tuple[Segment, ...], pace: Fraction) -> tuple[Segment, ...]:
-    """The schedule of a companion run, whose steps are `pace` times as long.
+    """Return the schedule of a companion run, whose steps are `pace` times as long.
 
-    A segment that does not hold a whole number of longer steps ends with one step of what is left.
+    A segment that is not a whole number of longer steps ends with one shorter step.
     """
     if pace == 1:
         return segments
     result: list[Segment] = []
-    for each in segments:
-        whole = int(each.steps / pace)
-        rest = each.steps - whole * pace
-        middle = each.end if not rest else each.start + float(whole * pace) * (each.end - each.start) / each.steps
+    for start, end, tick, steps, first in ((x.start, x.end, x.tick, x.steps, x.first) for x in segments):
+        whole = int(steps / pace)
+        rest = steps - whole * pace
+        middle = end if not rest else start + float(whole * pace) * (end - start) / steps
         if whole:
-            result.append(Segment(each.start, middle, each.tick, whole, each.first, pace))
+            result.append(Segment(start, middle, tick, whole, first, pace))
         if rest:
-            result.append(Segment(middle, each.end, each.tick and not whole, 1, each.first + int(whole * pace), rest))
+            result.append(Segment(middle, end, tick and not whole, 1, first + int(whole * pace), rest))
     return tuple(result)

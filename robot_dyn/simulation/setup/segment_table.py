@@ -1,7 +1,9 @@
-"""The segments of a run as arrays: its segments, their steps, and what the state equation is given on each.
+"""The segments of a run as arrays: times, steps, and the parameters p of the state equation on each segment.
 
-p = (first and last time of the segment, t₀, c₀, c₁, …)   with q_d(t) = Σⱼ c_j (t − t₀)ʲ on the segment, one polynomial
-of the references after the other; at one time, of a tick or of the end, the first terms of Taylor's series there
+    p = (first and last time of the segment, t₀, c₀, c₁, …),   q_d(t) = Σⱼ c_j (t − t₀)ʲ on the segment
+
+t₀ and c are repeated for each polynomial of the references. For the equation at one time, that of a tick or of the end,
+c are the first terms of the Taylor series of q_d there.
 """
 
 from __future__ import annotations
@@ -18,19 +20,20 @@ from robot_dyn.foundations.values import cached
 from robot_dyn.simulation.setup.schedule import paced
 from robot_dyn.simulation.setup.setup import Setup
 
-_MOST_CACHED = 1000  # segments: to compute more of them takes little of the time of their run, to cache them memory
-BOUNDS = 2  # numbers of p before the reference: time is held between them, so that switches act as between them
+_MOST_CACHED = 1000  # segments of a cached table: more take memory, and computing them takes little of a run's time
+BOUNDS = 2  # leading numbers of p: t is clipped to lie between them, so that no switch at an end acts inside
 
 
 class SegmentTable(NamedTuple):
-    """Segments without ticks or switches inside, S of them; the last is the end of the run, of no length.
+    """S segments without ticks or switches inside; the last one is the end of the run and has length 0.
 
     Attributes:
-        starts, lengths: When it starts and its step, (S,), in [s].
-        counts, ticks: Its steps, and the number, from 1, of the tick of a sampled controller at its start, or 0, (S,).
-        payload_events: 1 where a payload is picked up or dropped at its start, (S,).
-        parameters: p of the state equation on it, (S, P).
-        at_ticks: The same at its start alone.
+        starts, lengths: Start of each segment, and length of its steps, in [s], (S,).
+        counts: Number of steps on it, (S,).
+        ticks: Number, from 1, of the tick of a sampled controller at its start; 0 if there is no tick, (S,).
+        payload_events: 1 if a payload is picked up or dropped at its start, else 0, (S,).
+        parameters: p of the state equation on the segment, (S, P).
+        at_ticks: p at its start only, (S, P).
     """
 
     starts: Array
@@ -43,7 +46,7 @@ class SegmentTable(NamedTuple):
 
 
 def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
-    """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
+    """Return the segments of a setup with steps `pace` times as long, as arrays that a run may change."""
     if pace != 1 or len(setup.segments) > _MOST_CACHED:
         return table_of(setup, pace)
     table = cached(setup, table_of)
@@ -53,45 +56,45 @@ def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
 def table_of(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     """Return the segments of a setup with steps `pace` times as long."""
     segments = paced(setup.segments, pace)
-    counts = np.array([each.steps for each in segments])
-    starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))
-    ticks = np.array([*(each.tick for each in segments), setup.ends_on_tick]) & setup.equation.sampled
+    counts = np.array([segment.steps for segment in segments])
+    starts, ends = np.array([(segment.start, segment.end) for segment in segments]).T
+    ticks = np.array([*(segment.tick for segment in segments), setup.ends_on_tick]) & setup.equation.sampled
     bounds = np.column_stack([np.nextafter(starts, np.inf), np.nextafter(ends, -np.inf)])
-    followed = polynomials(setup.controller)
-    inside = np.hstack([bounds, *(_pieces(each, starts, ends) for each in followed)])
+    references = polynomials(setup.controller)
+    inside = np.hstack([bounds, *(_pieces(x, starts, ends) for x in references)])
     starts = np.append(starts, setup.duration_s)
     unbounded = np.broadcast_to([-np.inf, np.inf], (len(starts), BOUNDS))
-    at_ticks = np.ascontiguousarray(np.hstack([unbounded, *(_at_times(each, starts) for each in followed)]))
+    at_ticks = np.ascontiguousarray(np.hstack([unbounded, *(_at_times(x, starts) for x in references)]))
     return SegmentTable(
-        starts,
-        np.append((ends - starts[:-1]) / counts, 0.0),
-        np.append(counts, 1).astype(np.int64),
-        np.where(ticks, np.cumsum(ticks), 0),
-        np.append(np.isin(starts[:-1], _payload_events(setup)), False).astype(np.int64),
-        np.vstack([inside, at_ticks[-1:]]),
-        at_ticks,
+        starts=starts,
+        lengths=np.append((ends - starts[:-1]) / counts, 0.0),
+        counts=np.append(counts, 1).astype(np.int64),
+        ticks=np.where(ticks, np.cumsum(ticks), 0),
+        payload_events=np.append(np.isin(starts[:-1], _payload_events(setup)), False).astype(np.int64),
+        parameters=np.vstack([inside, at_ticks[-1:]]),
+        at_ticks=at_ticks,
     )
 
 
 def _payload_events(setup: Setup) -> list[float]:
-    """Times after the start at which payloads are picked up or dropped, in [s]."""
+    """Return the times after the start at which payloads are picked up or dropped, in [s]."""
     payloads = setup.plant.equation_of_motion.payloads
-    return [t for each in payloads for t in each.switches if t > 0]
+    return [t for payload in payloads for t in payload.switches if t > 0]
 
 
 def polynomials(controller: Controller | None) -> tuple[PiecewisePolynomial, ...]:
-    """The polynomials of the references of a controller."""
+    """Return the polynomials of the references of a controller."""
     references = () if controller is None else controller.references.values()
-    return tuple(each for reference in references for each in reference.polynomials.values())
+    return tuple(x for reference in references for x in reference.polynomials.values())
 
 
-def lengths(followed: PiecewisePolynomial) -> int:
-    """How many numbers define one of its pieces: t₀ and the coefficients."""
-    return 1 + followed.coefficients[0].size
+def lengths(polynomial: PiecewisePolynomial) -> int:
+    """Return the number of numbers that define a piece: t₀ and the coefficients."""
+    return 1 + polynomial.coefficients[0].size
 
 
 def _at_times(reference: PiecewisePolynomial, t: np.ndarray) -> np.ndarray:
-    """A reference near each of some times: t₀ = t and the coefficients of its value and derivatives there, (m, P)."""
+    """Return the Taylor polynomials of a reference at the times t: t₀ = t and q_d, q̇_d, q̈_d/2 there, (len(t), P)."""
     q, v, a = reference.at(t)
     table = np.zeros((len(t), *reference.coefficients.shape[1:]))
     for j, x in zip(range(len(reference.coefficients[0])), (q, v, a / 2), strict=False):
@@ -100,7 +103,7 @@ def _at_times(reference: PiecewisePolynomial, t: np.ndarray) -> np.ndarray:
 
 
 def _pieces(reference: PiecewisePolynomial, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """The polynomial that a reference is on each segment: t₀ and its coefficients, (S, P)."""
+    """Return the polynomial of a reference on each segment: t₀ and the coefficients, (S, P)."""
     breaks, middle = reference.breaks, (starts + ends) / 2
     piece = np.searchsorted(breaks[1:-1], middle, side="right")
     table = reference.coefficients[piece].copy()

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial, Reference
-from robot_dyn.description.edits import Payload
+from robot_dyn.description.edits import Edits, Payload
 from robot_dyn.foundations.coefficients import declared
+from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.queries.units import coefficient_unit
 from robot_dyn.simulation.setup.explanation import pace
 
@@ -19,25 +20,25 @@ if TYPE_CHECKING:
     from robot_dyn.control.controller import Controller
     from robot_dyn.simulation.setup.setup import Setup
 
-_MOST = 64  # numbers of an array that are written; of longer ones a digest
+_MOST = 64  # numbers of an array that are written out; a longer array is written as a digest
 
-Setting = tuple[str, str]  # its name and its value
+Setting = tuple[str, str]  # name and value
 
 
 def settings_of(setup: Setup) -> dict[str, str]:
-    """What a setup integrates, by name, the start apart; numbers as float() reads them.
+    """Return the settings of a run without its start, by name; `float` restores each number exactly.
 
-    Names are those of sweeps, as "viscous_friction.damping". Of several settings of one name the later ones are
-    numbered. What is no number, text or reference is named by its class.
+    Names are those of sweeps, for example "control.kp". If a name occurs several times, the later ones
+    are numbered. Parts that are not numbers, texts or references are given by their class.
     """
-    found: dict[str, str] = {}
+    settings: dict[str, str] = {}
     for name, value in _all(setup):
-        number, known = 1, name
-        while known in found:
+        number, unique = 1, name
+        while unique in settings:
             number += 1
-            known = f"{name} ({number})"
-        found[known] = value
-    return found
+            unique = f"{name} ({number})"
+        settings[unique] = value
+    return settings
 
 
 def _all(setup: Setup) -> Iterator[Setting]:
@@ -49,23 +50,23 @@ def _all(setup: Setup) -> Iterator[Setting]:
         yield from _numbers(effect.name, effect, types)
     if setup.controller is not None:
         yield from _of_controller(setup.controller, types)
-    method: Any = setup.integrator
+    method = setup.method
     yield "method", method.name
-    if method.controls_error:
+    if isinstance(method, Adaptive):
         yield from (("rtol", _number(method.rtol)), ("atol", _number(method.atol)))
     else:
         yield "step", f"{_number(setup.nominal_step_s)} s"
-    yield from (("event", each.name) for each in setup.events)
+    yield from (("event", event.name) for event in setup.events)
 
 
-def edits_by_name(robot: Any) -> Iterator[Setting]:
-    """What was changed of a robot."""
-    if not hasattr(robot, "edits"):
+def edits_by_name(robot: object) -> Iterator[Setting]:
+    """Yield the edits of a robot; nothing if it has none."""
+    edits: Edits | None = getattr(robot, "edits", None)
+    if edits is None:
         return
-    edits = robot.edits
     yield "gravity", f"{_text(np.array(edits.gravity))} m/s²"
-    for each in edits.payloads:
-        yield f"payload on {each.frame}", _payload(each)
+    for payload in edits.payloads:
+        yield f"payload on {payload.frame}", _payload(payload)
     yield "mass_scale", _text(edits.mass_scale)
     for key in ("lock", "armature", "masses", "inertias"):
         yield from ((f"{key}.{name}", _text(np.array(value))) for name, value in getattr(edits, key))
@@ -81,21 +82,21 @@ def _of_controller(controller: Controller, types: Any) -> Iterator[Setting]:
         robot = getattr(model, "robot", model)
         yield f"control.{path}", getattr(robot, "name", type(robot).__name__)
         yield from ((f"control.{path}.{name}", value) for name, value in edits_by_name(robot))
-    for path, each in controller.references.items():
-        yield path if path == "reference" else f"control.{path}", _motion(each)
+    for path, reference in controller.references.items():
+        yield path if path == "reference" else f"control.{path}", _motion(reference)
 
 
 def _numbers(name: str, part: Any, types: Any) -> Iterator[Setting]:
-    """The numbers and texts that a part was built with, those that are declared with their units."""
-    names = [each.name for each in fields(part)] if is_dataclass(part) else list(vars(part))
-    known = declared(type(part))
+    """Yield the numbers and texts of a part; declared coefficients with their units."""
+    names = [field.name for field in fields(part)] if is_dataclass(part) else list(vars(part))
+    coefficients = declared(type(part))
     for key in names:
         value = getattr(part, key)
         if isinstance(value, Payload):
             yield f"{name}.{key} on {value.frame}", _payload(value)
         if key.startswith("_") or key == "period_s" or not _is_plain(value):
             continue
-        unit = coefficient_unit(known[key], types) if key in known and not isinstance(value, str) else ""
+        unit = coefficient_unit(coefficients[key], types) if key in coefficients and not isinstance(value, str) else ""
         yield f"{name}.{key}", f"{_text(value)} {unit}".rstrip()
 
 
@@ -107,14 +108,14 @@ def _payload(payload: Payload) -> str:
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether it is a text, a number, or numbers."""
+    """Return True for a text, a number, or a sequence of numbers."""
     if isinstance(value, tuple | list):
-        return bool(value) and all(isinstance(each, float | int) for each in value)
+        return bool(value) and all(isinstance(x, float | int) for x in value)
     return isinstance(value, np.ndarray | np.number | float | int | str)
 
 
 def _text(value: Any) -> str:
-    """A text, a number, or numbers; a vector of equal ones as one number."""
+    """Return the text of a text, a number or numbers; equal entries of a vector are written once."""
     if isinstance(value, str | int):
         return str(value)
     numbers = np.asarray(value, dtype=float)
@@ -125,16 +126,16 @@ def _text(value: Any) -> str:
 
 
 def _number(x: float) -> str:
-    """As float() reads it, without a decimal point that says nothing."""
+    """Return the text that `float` reads as x, without a trailing ".0"."""
     return repr(float(x)).removesuffix(".0")
 
 
 def _motion(reference: Reference) -> str:
-    """Its class, its end, and a digest of its numbers."""
+    """Return the class of a reference, its end, and a digest of its numbers."""
     parts = reference.polynomials.values()
-    held = [each for part in (reference, *parts) for each in vars(part).values()]
-    numbers = [np.asarray(each, dtype=float) for each in held if isinstance(each, np.ndarray)]
-    ends = [each.end for each in parts if isinstance(each, PiecewisePolynomial)]
+    attributes = [x for part in (reference, *parts) for x in vars(part).values()]
+    numbers = [np.asarray(x, dtype=float) for x in attributes if isinstance(x, np.ndarray)]
+    ends = [part.end for part in parts if isinstance(part, PiecewisePolynomial)]
     until = f", to {max(ends):g} s" if ends else ""
     return f"{type(reference).__name__}{until}, numbers {_digest(*numbers)}"
 

@@ -22,7 +22,7 @@ def weak_joints(document: Document, robot: Robot, others: Iterable[Finding]) -> 
     """Report joints whose effort limit, if not 0, is below the gravity load; `others` are all other findings."""
     explained = any(other.kind in _CAUSES and other.severity is not Severity.NOTE for other in others)
     q = np.clip(0.0, robot.lower, robot.upper)
-    N = robot.N(q, errors="nan")
+    N = robot.nan_rows.N(q)
     for name, load, limit in zip(robot.joint_names, np.abs(N), robot.effort_limit, strict=True):
         if 0 < limit < load:
             joint = document.named("joint", name)

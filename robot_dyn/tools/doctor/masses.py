@@ -28,6 +28,7 @@ _KINDS = (
     (Severity.WARNING, "mass_tiny", doctor.tiny_masses),
     (Severity.WARNING, "length_long", doctor.long_lengths),
     (Severity.WARNING, "mimic_ratio", doctor.large_ratios),
+    (Severity.WARNING, "mimic_limits", doctor.followers_beyond_limits),
     (Severity.NOTE, "base_mobile", doctor.welded_base),
     (Severity.NOTE, "inertia_impossible", doctor.impossible_inertias_of_the_base),
 )
@@ -56,6 +57,8 @@ def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
     """Return the findings that `load` reports too."""
     for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
         yield _of_words(Severity.ERROR, "inertia_missing", text)
+    for text in doctor.for_other_programs(stated, robot.description):
+        yield _of_words(Severity.NOTE, "other_programs", text)
     idle = _negligible(stated)
     for severity, kind, find in _KINDS:
         for text in find(stated):

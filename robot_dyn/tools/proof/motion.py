@@ -6,6 +6,7 @@ refused with their names. Coefficients and gains are the exact values of the sto
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
@@ -62,10 +63,11 @@ class Motion:
             return total
         own: dict[str, Any] = {name: _Piece(x, piece) for name, x in self.controller.references.items()}
         own |= {name: Bodies(_robot(x, self.controller.name), model.arithmetic) for name, x in self._models}
-        return total + with_values(self.controller, own).torque(t, q, v, total[:0])
+        law: Any = with_values(self.controller, own)  # on numbers of the trace, which its types exclude
+        return total + law.torque(t, q, v, total[:0])
 
     @property
-    def _models(self) -> Any:
+    def _models(self) -> Iterable[tuple[str, object]]:
         return self.controller.models.items() if self.controller is not None else ()
 
 

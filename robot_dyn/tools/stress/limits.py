@@ -26,7 +26,7 @@ from robot_dyn import Lagrangian, Payload, Plant, Robot, RobotDynError, Setup, T
 from robot_dyn.accuracy import Advice, Batch, advice_about, at_rest, evaluate
 from robot_dyn.control import PDGravity, hold
 from robot_dyn.effects import EffortLimit, ViscousFriction
-from robot_dyn.integrate import FIXED_STEP, Gauss, method
+from robot_dyn.integrate import FIXED_STEP, GaussLegendre, method
 from robot_dyn.queries import CORIOLIS_TORQUE, N
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending, RemarkKind, Stability, StateEquation, jacobian, linearised, step_map
@@ -151,7 +151,7 @@ def _tip(robot: Robot, states: Batch) -> str:
     effort = np.where(np.isfinite(effort), effort, np.nanmin(effort[np.isfinite(effort)], initial=1.0))
 
     def torque(frame: str) -> float:
-        per_kg = np.abs(np.einsum("skj,k->sj", robot.jacobian(q, frame, errors="nan")[:, :3], robot.gravity))
+        per_kg = np.abs(np.einsum("skj,k->sj", robot.nan_rows.jacobian(q, frame)[:, :3], robot.gravity))
         return float((per_kg / effort).max(axis=1).mean())
 
     return max(robot.frame_names, key=torque)
@@ -197,11 +197,11 @@ def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: i
     limit is not sharp, and is therefore neither confirmed nor refuted by its value.
     """
     limit = Limit("step", name, advice.fastest.joint, advice.limits[name], "s", state={"q": setup.q0.tolist()})
-    at, iterates = setup.q0, isinstance(method(name), Gauss)
+    at, iterates = setup.q0, isinstance(method(name), GaussLegendre)
     try:
         unstable = isfinite(limit.value) and not iterates
         matrix = step_map(method(name), J, len(at))(_BEYOND * limit.value) if unstable else J
-        setup = _pushed(replace(setup, integrator=name), matrix, seed)
+        setup = _pushed(replace(setup, method=name), matrix, seed)
         if not isfinite(limit.value):
             setup = replace(setup, step_s=setup.duration_s / _PARTS)
             run = run_from_near(setup, at, budget, True)

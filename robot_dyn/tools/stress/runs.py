@@ -28,10 +28,10 @@ from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import shrunk
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
-_METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "rosenbrock_5")
+_METHODS = ("Euler", "SemiImplicitEuler", "Midpoint", "RK4", "DP8", "GaussLegendre4", "Rodas5PFixed")
 _DRAWS = 20  # attempts to draw a method that the scene accepts
 _RECORDS = 20
-_BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
+_BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-11, 1e-13))
 _ROUNDING = 1e-12  # relative to 1 + |q|: smaller errors cannot be measured
 _ONE_TIME = 1e-12  # [s]
 _MOST_TRIES = 25  # attempts to simplify the start of a misleading run
@@ -58,11 +58,11 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
     for _ in range(_DRAWS):
         drawn, step = _method(rng)
         try:
-            setup = Setup(plant, q, v, duration, control, drawn, record_period_s=record, **step)
+            setup = Setup(plant, q, v, duration, control, drawn, record_every_s=record, **step)
         except RobotDynError:  # not every method supports every effect
             continue
-        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
-        return setup, f"{family}: {setup.integrator.name}{steps}"
+        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.method.rtol:.0e}"
+        return setup, f"{family}: {setup.method.name}{steps}"
     return Setup(plant, q, v, duration, control), f"{family}: auto"
 
 
@@ -95,7 +95,7 @@ def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:
     """Draw a random method, with a step or with tolerances."""
     if rng.random() < 0.4:
         rtol = float(f"{10 ** rng.uniform(-10, -5):.0e}")
-        return Adaptive(str(rng.choice(["DOP853", "Rosenbrock"])), rtol, rtol / 100), {}
+        return Adaptive(str(rng.choice(["DOP853", "Rodas5P"])), rtol, rtol / 100), {}
     return method(str(rng.choice(_METHODS))), {"step_s": float(np.round(10 ** rng.uniform(-3.3, -2), 5))}
 
 
@@ -127,8 +127,8 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     report = says(run) if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     if error is None or not finished or not error.until_s:
         return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
-    sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
-    better = [simulate(replace(sure, integrator=integrator), on_progress=budget.check) for integrator in _BETTER]
+    sure = replace(setup, step_s=None, estimate_error=False, method=_BETTER[0])
+    better = [simulate(replace(sure, method=integrator), on_progress=budget.check) for integrator in _BETTER]
     if any(x.outcome.ending is not Ending.FINISHED for x in better):
         raise RobotDynError("a better run did not finish")
     if any(x.t.shape != run.t.shape or np.abs(x.t - run.t).max() > _ONE_TIME for x in better):

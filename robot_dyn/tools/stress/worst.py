@@ -190,7 +190,7 @@ def _slopes(robot: Robot) -> np.ndarray:
     """Return −∂τ/∂v of the friction of the file at rest, (n,)."""
     plant, zeros = Plant(robot, "urdf"), np.zeros(robot.n)
     h = 1e-9  # far below the velocities over which friction is regularised
-    return np.array([-plant.torque(0.0, zeros, h * unit)[i] / h for i, unit in enumerate(np.eye(robot.n))])
+    return np.array([-plant.torque(zeros, h * unit, t=0.0)[i] / h for i, unit in enumerate(np.eye(robot.n))])
 
 
 def _rates(robot: Robot, batch: Batch, damping: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from robot_dyn.tools.sweeps.distributions import uniform as uniform
 from robot_dyn.tools.sweeps.figures import Run as Run
 from robot_dyn.tools.sweeps.figures import final as final
 from robot_dyn.tools.sweeps.figures import peak as peak
-from robot_dyn.tools.sweeps.figures import rms_error as rms_error
+from robot_dyn.tools.sweeps.figures import rms_tracking_error as rms_tracking_error
 from robot_dyn.tools.sweeps.result import SweepResult as SweepResult
 from robot_dyn.tools.sweeps.run_sweep import read_sweep as read_sweep
 from robot_dyn.tools.sweeps.run_sweep import run as run

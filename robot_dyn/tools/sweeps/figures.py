@@ -1,7 +1,7 @@
 """Figures: numbers of a run that a sweep keeps, f(run) → float, and the runs that they are computed from.
 
-`rms_error`, `peak` and `final` are computed for a batch at once; functions of users are named by import path. Sums add
-one term after the other, so that their bits do not depend on other runs in the batch.
+`rms_tracking_error`, `peak` and `final` are computed for a batch at once; your own functions are named by import path.
+Sums add one term after the other, so that their bits do not depend on other runs in the batch.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Run(Value):
         t: Times of the samples, (m,), in [s].
         q, v, u: Position, velocity, actuation, (m, n); None where not recorded.
         kinetic, potential: Energies, (m,), in [J]; None where not recorded.
-        desired, deviation: Same as in `Trajectory`; None without a reference.
+        desired, tracking_error: Same as in `Trajectory`; None without a reference.
         extremes: Smallest and largest values of q, v and u over all steps, (3, 2, n).
         ended: Time at which the run ended, in [s].
         params: Start, "q0" and "v0", and values of varying parameters, by name, (size,).
@@ -48,7 +48,7 @@ class Run(Value):
     kinetic: np.ndarray | None
     potential: np.ndarray | None
     desired: np.ndarray | None
-    deviation: np.ndarray | None
+    tracking_error: np.ndarray | None
     extremes: np.ndarray
     ended: float
     params: dict[str, np.ndarray]
@@ -106,15 +106,15 @@ class Runs:
         return self._rollouts.setup_of(int(self._places[i])) if self._references_vary else self._setup
 
     @cached_property
-    def deviation(self) -> np.ndarray | None:
-        """Deviation of the joints, or the frame, from the reference, (B, m, k); None without a reference or q."""
+    def tracking_error(self) -> np.ndarray | None:
+        """Reference minus position of the joints, or of the frame, (B, m, k); None without a reference or q."""
         if self.q is None:
             return None
         q = self.q if self.known.all() else np.where(self.known[..., None], self.q, 0.0)
         if not self._references_vary:
-            return tracking_of(self._setup, self.t, q).deviation
-        deviations = [tracking_of(self._setup_of(i), self.t, q[i]).deviation for i in range(len(self))]
-        return None if deviations[0] is None else np.stack(deviations)  # pyright: ignore[reportArgumentType, reportCallIssue]
+            return tracking_of(self._setup, self.t, q).tracking_error
+        errors = [tracking_of(self._setup_of(i), self.t, q[i]).tracking_error for i in range(len(self))]
+        return None if errors[0] is None else np.stack(errors)  # pyright: ignore[reportArgumentType, reportCallIssue]
 
     def run(self, i: int) -> Run:
         """Return one run."""
@@ -124,7 +124,7 @@ class Runs:
             return None if x is None else np.ascontiguousarray(x[i][known])
 
         t, q = np.ascontiguousarray(self.t[known]), select(self.q)
-        desired, _, deviation = (None,) * 3 if q is None else tracking_of(self._setup_of(i), t, q)
+        desired, _, tracking_error = (None,) * 3 if q is None else tracking_of(self._setup_of(i), t, q)
         starts = {name: x for name, x in (("q0", runs.q0), ("v0", runs.v0)) if x is not None}
         values = {name: x[place] for name, x in (starts | runs.params).items()}
         return Run(
@@ -135,7 +135,7 @@ class Runs:
             kinetic=select(self.kinetic),
             potential=select(self.potential),
             desired=desired,
-            deviation=deviation,
+            tracking_error=tracking_error,
             extremes=self.extremes[i],
             ended=float(self.ended[i]),
             params=values,
@@ -162,8 +162,8 @@ class Figure(Value):
     """A number of each run, computed by the library.
 
     Attributes:
-        name: "rms_error", "peak" or "final".
-        of_what: "q", "v", "u" or "error".
+        name: "rms_tracking_error", "peak" or "final".
+        of_what: "q", "v", "u" or "tracking_error".
         joint: Name of a joint, or None for all joints.
     """
 
@@ -172,20 +172,20 @@ class Figure(Value):
     joint: str | None = None
 
     def __post_init__(self) -> None:
-        choice(self.name, self.of_what, (*_STATES, "error"), error=SweepError)
+        choice(self.name, self.of_what, (*_STATES, "tracking_error"), error=SweepError)
         if self.joint is not None and not isinstance(self.joint, str):
             raise SweepError(f"{self.name}: joint must be the name of a joint, got {shown(self.joint)}")
 
     @property
     def record(self) -> tuple[str, ...]:
         """Quantities to record, some of "q", "v", "u", "energy", "work"."""
-        if self.of_what == "error":
+        if self.of_what == "tracking_error":
             return ("q",)
         return ("q", self.of_what) if self.name == "final" else ()  # q shows where a run ends
 
     def unit(self, setup: Setup) -> str:
         """Return the unit of the numbers; empty if unknown, "m" for the error of a frame that follows a path."""
-        is_error, controller, dynamics = self.of_what == "error", setup.controller, setup.plant.dynamics
+        is_error, controller, dynamics = self.of_what == "tracking_error", setup.controller, setup.plant.dynamics
         if is_error and controller is not None and isinstance(controller.desired, CartesianReference):
             return "m"
         types = dict(zip(dynamics.joint_names, joint_types_of(dynamics), strict=True))
@@ -194,25 +194,29 @@ class Figure(Value):
 
     def of(self, runs: Runs) -> np.ndarray:
         """Compute the numbers of finished runs, (B,)."""
-        if self.of_what != "error" and self.name == "peak":
+        if self.of_what != "tracking_error" and self.name == "peak":
             extremes = runs.extremes[:, _STATES.index(self.of_what)]
             return np.abs(runs.of_joint(extremes, self.joint)).max(axis=(1, 2))
-        if self.of_what == "error" and runs.deviation is None:
-            raise SweepError(f"{self.name}: there is no error without a reference; add a controller with a reference")
-        x = runs.of_joint(runs.deviation if self.of_what == "error" else getattr(runs, self.of_what), self.joint)
+        if self.of_what == "tracking_error" and runs.tracking_error is None:
+            raise SweepError(
+                f"{self.name}: there is no tracking error without a reference; add a controller with a reference"
+            )
+        x = runs.of_joint(
+            runs.tracking_error if self.of_what == "tracking_error" else getattr(runs, self.of_what), self.joint
+        )
         if self.name == "peak":
             return np.abs(np.where(runs.known[..., None], x, 0.0)).max(axis=(1, 2))
-        if self.name == "rms_error":
+        if self.name == "rms_tracking_error":
             return _root_mean_square(x, runs.known)
         last = x[np.arange(len(runs)), runs.known.sum(axis=1) - 1]
-        if self.of_what != "error" and last.shape[1] > 1:
+        if self.of_what != "tracking_error" and last.shape[1] > 1:
             names = ", ".join(runs.joint_names)
             raise SweepError(f"final({self.of_what!r}) needs a joint; give joint=, one of {names}")
-        return np.abs(last).max(axis=1) if self.of_what == "error" else last[:, 0]
+        return np.abs(last).max(axis=1) if self.of_what == "tracking_error" else last[:, 0]
 
     def to_dict(self) -> dict[str, Any]:
         """Return name and arguments, for JSON."""
-        quantity = {} if self.name == "rms_error" else {"of_what": self.of_what}
+        quantity = {} if self.name == "rms_tracking_error" else {"of_what": self.of_what}
         return {"figure": self.name} | quantity | {"joint": self.joint}
 
     def __str__(self) -> str:
@@ -280,25 +284,30 @@ class UserFigure(Value):
         return {"figure": self.path, "sha256": digest, "unit": self.unit()}
 
 
-def rms_error(joint: str | None = None) -> Figure:
-    """Return the figure: root mean square of q − q_d over the samples, and over the joints or for one.
+def rms_tracking_error(joint: str | None = None) -> Figure:
+    """Return the figure: root mean square of q_d − q over the samples, and over the joints or for one.
 
-    Samples are `record_period_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
+    Samples are `record_every_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
     """
-    return Figure("rms_error", "error", joint)
+    return Figure("rms_tracking_error", "tracking_error", joint)
 
 
 def peak(of_what: str, joint: str | None = None) -> Figure:
-    """Return the figure: largest |q|, |v| or |u| over all steps, or |error| over the samples; of one joint or all."""
+    """Return the figure: largest |q|, |v| or |u| over all steps, or largest tracking error over the samples.
+
+    It is of one joint, or of all joints by default.
+    """
     return Figure("peak", of_what, joint)
 
 
 def final(of_what: str, joint: str | None = None) -> Figure:
-    """Return the figure: last "q", "v" or "u" of a joint, or largest absolute last "error" over the joints."""
+    """Return the figure: last "q", "v" or "u" of a joint, or largest absolute last "tracking_error" over the joints."""
     return Figure("final", of_what, joint)
 
 
-FIGURES: Mapping[str, Callable[..., Figure]] = {function.__name__: function for function in (rms_error, peak, final)}
+FIGURES: Mapping[str, Callable[..., Figure]] = {
+    function.__name__: function for function in (rms_tracking_error, peak, final)
+}
 
 
 def figure(name: str, value: Any) -> Figure | UserFigure:

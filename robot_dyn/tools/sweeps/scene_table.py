@@ -14,7 +14,8 @@ class SweepTable(Part):
 
     Values of `vary` and `figures` are texts, which are parsed but not executed: distributions `uniform(low=0, high=3)`,
     `normal(mean=1, sd=0.1)`, `lognormal(median=1, sigma_of_log=0.2)`, `triangular(low=0, mode=1, high=3)`,
-    `choice([50, 100])`, of lists of numbers for arrays; figures `rms_error()`, `peak('u')`, `final('q', 'joint')`.
+    `choice([50, 100])`, of lists of numbers for arrays; figures `rms_tracking_error()`, `peak('u')`,
+    `final('q', 'joint')`.
     """
 
     runs: Annotated[int, Field(gt=0, strict=True)]

@@ -197,7 +197,7 @@ def _setup(sweep: Sweep) -> dict[str, Any]:
         "q0": setup.q0.tolist(),
         "v0": setup.v0.tolist(),
         "duration_s": setup.duration_s,
-        "record_period_s": setup.record_period_s,
+        "record_every_s": setup.record_every_s,
         "engine": setup.engine,
     }
     if is_scene(sweep.scene):

@@ -34,8 +34,8 @@ class Sweep(Answer, Value):
         runs: Number of runs, N.
         vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". Frozen distributions of
             scipy.stats and texts such as "uniform(low=0, high=3)" are allowed, too.
-        figures: Figures of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a `Run`
-            by import path. Texts such as "peak('u')" are allowed, too.
+        figures: Figures of each run, by name: `rms_tracking_error()`, `peak("u")`, `final("q", joint)`, or a function
+            of a `Run` by import path. Texts such as "peak('u')" are allowed, too.
         design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), with a column for
             each varying number.
         seed: Seed of the design.
@@ -231,9 +231,9 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
 
 def samples_of_run(setup: Setup) -> int:
     """Return the largest number of samples of a run."""
-    if setup.record_period_s:
-        return int(setup.duration_s / setup.record_period_s) + 2
-    return 1000 if setup.integrator.controls_error else setup.steps + 1
+    if setup.record_every_s:
+        return int(setup.duration_s / setup.record_every_s) + 2
+    return 1000 if setup.method.controls_error else setup.steps + 1
 
 
 def parameter_of(column: str) -> str:

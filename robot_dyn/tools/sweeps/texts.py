@@ -15,7 +15,7 @@ from robot_dyn.foundations import SweepError, nearest, shorten, shown
 _MOST = 10_000  # largest number of characters
 _EXAMPLES = {
     "distribution": "uniform(low=0, high=3)",
-    "figure": "rms_error() or peak('u'), or an import path such as 'my_figures:settling'",
+    "figure": "rms_tracking_error() or peak('u'), or an import path such as 'my_figures:settling'",
     "samples": "samples('q', every=10)",
 }
 

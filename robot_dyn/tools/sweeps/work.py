@@ -200,4 +200,4 @@ def _in_halves(places: np.ndarray, attempt: Callable[[np.ndarray], Any]) -> Iter
 def _check_times(t: np.ndarray, known: np.ndarray) -> None:
     """Raise a SweepError unless the times of a batch are the first times of all runs."""
     if len(t) > len(known) or (t != known[: len(t)]).any():
-        raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_period_s")
+        raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_every_s")

@@ -101,13 +101,13 @@ def tracking(view: BatchView) -> list[Panel]:
     if runs.setup is None or runs.q is None:
         raise PlotError("tracking: the runs were read from a file, or have no positions")
     found = tracking_of(runs.setup, runs.t, np.nan_to_num(runs.q))
-    if found.deviation is None:
+    if found.tracking_error is None:
         raise PlotError("tracking: the runs followed no reference")
-    off = np.where(np.isfinite(runs.q.sum(axis=2))[..., None], found.deviation, np.nan)
+    off = np.where(np.isfinite(runs.q.sum(axis=2))[..., None], found.tracking_error, np.nan)
     if found.desired is None:
-        return [_fans(view, "Tracking error", [(f"frame, {axis}", "p − p_d [m]") for axis in "xyz"], off)]
+        return [_fans(view, "Tracking error", [(f"frame, {axis}", "p_d − p [m]") for axis in "xyz"], off)]
     kinds = joint_types(runs)
-    names = [(runs.joint_names[i], f"q − q_d [{unit('q', kinds[i])}]") for i in view.joints]
+    names = [(runs.joint_names[i], f"q_d − q [{unit('q', kinds[i])}]") for i in view.joints]
     return [_fans(view, "Tracking error", names, off[:, :, list(view.joints)])]
 
 
@@ -123,8 +123,8 @@ def outcomes(view: BatchView) -> list[Panel]:
 
 
 def histogram(view: BatchView) -> list[Panel]:
-    """How often a figure of the runs has which value; by default the tracking error, else the first extreme."""
-    name, values = _column(view.runs, "y", view.y, ("tracking error", "largest", "ended"))
+    """How often a figure of the runs has which value; by default the rms tracking error, else the first extreme."""
+    name, values = _column(view.runs, "y", view.y, ("rms tracking error", "largest", "ended"))
     some = np.isfinite(values) & ~view.runs.diverged
     if not some.any():
         raise PlotError(f"no run that did not diverge has a {name}")
@@ -144,7 +144,7 @@ def scatter(view: BatchView) -> list[Panel]:
     if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.params, "start "))]):
         raise PlotError("scatter: no parameter and no start differs from run to run; name a column by x=")
     x, at = _column(runs, "x", view.x or varied[0], ())
-    y, values = _column(runs, "y", view.y, ("tracking error", "largest", "ended"))
+    y, values = _column(runs, "y", view.y, ("rms tracking error", "largest", "ended"))
     held = ~runs.diverged
     points = (Curve("run", at[held], values[held], dots=True),)
     cell = Cell(_title(view, np.isfinite(values) & held), x, y, points, lost=at[runs.diverged])

@@ -63,7 +63,7 @@ def overview(view: View) -> list[Panel]:
     run, held = view.run, rests(view.run)
     known = {"q": _position}
     known |= {"u": _torque} if np.nan_to_num(run.u).any() else {}
-    known |= {"error": _off} if run.deviation is not None and run.desired is not None else {}
+    known |= {"error": _off} if run.tracking_error is not None and run.desired is not None else {}
     known |= {"v": _velocity}
     shown = [name for name in ("q", "v", "u", "error") if name in list(known)[: view.columns]]
     rows = []
@@ -76,7 +76,7 @@ def overview(view: View) -> list[Panel]:
     hidden = " and ".join(name for name in known if name not in shown)
     heading += f"; no room for {hidden}" if hidden else ""
     panels = [Panel(heading, tuple(rows), 24.0, every=len(rows))]
-    if run.deviation is not None and run.desired is None:
+    if run.tracking_error is not None and run.desired is None:
         panels += tracking(view)
     lower = _ledger(view) if run.ledger.known else []
     lower += [_growth(view, run.error)] if run.error is not None and len(run.error.t) > 1 else []
@@ -122,24 +122,24 @@ def energy(view: View) -> list[Panel]:
 
 
 def tracking(view: View) -> list[Panel]:
-    """Deviation of each joint, or of the frame along each axis, from the reference.
+    """Tracking error of each joint, or of the frame along each axis.
 
     Raises:
         PlotError: If the run followed no reference.
     """
     run = view.run
-    if run.deviation is None:
+    if run.tracking_error is None:
         raise PlotError(
             "the run has no tracking error, since it followed no reference; simulate with a controller that has one"
         )
     if run.desired is None:
         columns, units = [0, 1, 2], ["m"] * 3
-        each = zip("xyz", run.deviation.T, strict=True)
-        cells = [Cell(f"frame, {axis}", TIME, "p − p_d [m]", (Curve("error", run.t, y),)) for axis, y in each]
+        each = zip("xyz", run.tracking_error.T, strict=True)
+        cells = [Cell(f"frame, {axis}", TIME, "p_d − p [m]", (Curve("error", run.t, y),)) for axis, y in each]
     else:
         columns, units = list(view.joints), [view.unit("q", i) for i in view.joints]
         cells = [replace(_off(view, i), note="") for i in view.joints]
-    off = run.deviation[:, columns]
+    off = run.tracking_error[:, columns]
     rms = {unit: _rms(off[:, [each == unit for each in units]]) for unit in dict.fromkeys(units)}
     heading = "Tracking error, rms " + ", ".join(f"{x:.2e} {unit}" for unit, x in rms.items())
     return [Panel(heading, in_rows(cells, view.columns))]
@@ -199,9 +199,9 @@ def _torque(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
 
 def _off(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
     run, of_q = view.run, view.unit("q", i)
-    off = np.zeros_like(run.t) if run.deviation is None else run.deviation[:, i]
+    off = np.zeros_like(run.t) if run.tracking_error is None else run.tracking_error[:, i]
     note = f"rms {_rms(off):.2e} {of_q}"
-    return Cell(run.joint_names[i], TIME, f"q − q_d\n[{of_q}]", (Curve("error", run.t, off),), note=note)
+    return Cell(run.joint_names[i], TIME, f"q_d − q\n[{of_q}]", (Curve("error", run.t, off),), note=note)
 
 
 def _ledger(view: View) -> list[Cell]:

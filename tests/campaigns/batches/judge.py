@@ -60,7 +60,7 @@ def alone(given: Batch, run: int) -> rd.Setup:
     rows = {name: x[run] for name, x in given.params.items()}
     plant, controller = with_parameters(given.setup.plant, given.setup.controller, rows)
     controller = None if controller is None else controller.of_run(run)
-    engine = "compiled" if run or given.setup.integrator.controls_error else "interpreted"
+    engine = "compiled" if run or given.setup.method.controls_error else "interpreted"
     return replace(given.setup, plant=plant, controller=controller, q0=given.q0[run], v0=given.v0[run], engine=engine)
 
 

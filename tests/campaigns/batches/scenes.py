@@ -9,8 +9,8 @@ import numpy as np
 import robot_dyn as rd
 
 FAMILIES = ("soft stops", "rigid stops", "dry friction", "window", "effort limit", "bristles", "sampled")
-METHODS = ("rk4", "rk4", "rk4", "order_8", "gauss_4", "DOP853")
-EVENTS = ("rk4", "rk4", "order_8", "DOP853")  # of methods whose steps can end where joints are held
+METHODS = ("RK4", "RK4", "RK4", "DP8", "GaussLegendre4", "DOP853")
+EVENTS = ("RK4", "RK4", "DP8", "DOP853")  # of methods whose steps can end where joints are held
 MOST = 6  # runs
 
 
@@ -40,7 +40,7 @@ def batch(seed: int, index: int) -> Batch:
         rd.Plant(arm, [rd.effects.ViscousFriction(scale * rng.uniform(0.1, 1.0, arm.n)), *effects]), q0[0], v0[0],
         duration,
         _controller(rng, family, arm, q0[0], scale, duration), method,
-        record_period_s=float(rng.choice([0.0, 0.02])), estimate_error=False, engine="compiled", **options,
+        record_every_s=float(rng.choice([0.0, 0.02])), estimate_error=False, engine="compiled", **options,
     )  # fmt: skip
     swept |= {"viscous_friction.damping": scale * rng.uniform(0.1, 1.0, (B, arm.n))}
     params = {key: np.broadcast_to(x, (B, arm.n)) for key, x in swept.items() if rng.random() < 0.5}

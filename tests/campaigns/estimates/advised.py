@@ -11,7 +11,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import with_values
 from tests.campaigns.estimates.scenes import arms
 
-METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8")
+METHODS = ("Euler", "SemiImplicitEuler", "Midpoint", "RK4", "DP8")
 _FAR, _LEAST = 30.0, 1e-4  # times as far from the motion as with half the length, and [rad] or [m] more: blown up
 _NEAR = 1.02  # of a limit that is bisected
 
@@ -55,7 +55,7 @@ def limited(seed: int, index: int) -> Limited:
 
 def blow_up(scene: Limited, near: float) -> float:
     """The length at which runs begin to blow up, bisected between a third and three times a length."""
-    exact = rd.simulate(scene.of(near / 20), integrator="rk4" if scene.sampled else "rosenbrock_5")
+    exact = rd.simulate(scene.of(near / 20), method="RK4" if scene.sampled else "Rodas5PFixed")
     usual = _off(rd.simulate(scene.of(near / 2)), exact)
     return _bisected(
         lambda length: _off(rd.simulate(scene.of(length)), exact) > _FAR * usual + _LEAST, near / 3, near * 3

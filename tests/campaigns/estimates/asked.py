@@ -26,7 +26,7 @@ def asked_scene(seed: int, index: int) -> tuple[Scene, float]:
         plant = rd.Plant(
             plant.dynamics, [*plant.effects, rd.effects.ViscousFriction(scale * 10 ** rng.uniform(2, 4.3, n))]
         )
-    setup = replace(made.setup, plant=plant, integrator="auto", step_s=None)
+    setup = replace(made.setup, plant=plant, method="auto", step_s=None)
     return Scene(family, setup, made.label), float(10 ** rng.uniform(-10, -3))
 
 
@@ -92,7 +92,7 @@ def request(seed: int, index: int) -> tuple[Scene, float]:
         else:
             law = rd.control.PD(plan, *rd.control.gains_from(scale, rng.uniform(3, 12), 0.7), period_s=period)
     setup = rd.Setup(
-        rd.Plant(arm, effects), q, v, duration, law, record_period_s=duration / 20, engine="interpreted"
+        rd.Plant(arm, effects), q, v, duration, law, record_every_s=duration / 20, engine="interpreted"
     )  # fmt: skip
     return Scene("request", setup, f"{seed}/{index} {name} T={duration:g}"), float(10 ** rng.uniform(-11, -3))
 

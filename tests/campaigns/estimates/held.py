@@ -37,7 +37,7 @@ def held_scene(seed: int, index: int, of: str = "") -> tuple[Scene, float]:
     if rng.random() < 0.5:
         gains = scale * rng.uniform(5, 60, n), scale * rng.uniform(0.3, 3, n)
         drive = rd.control.PD(rd.control.hold(q + rng.uniform(-0.5, 0.5, n)), *gains)
-    setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, record_period_s=duration / 20)
+    setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, record_every_s=duration / 20)
     return Scene(family, setup, f"{seed}/{index} {family} {name} T={duration:g}"), float(10 ** rng.uniform(-10, -3))
 
 
@@ -54,7 +54,7 @@ def _friction(rng: np.random.Generator, level: np.ndarray) -> rd.Effect:
 def cut(made: Scene) -> Scene:
     """The scene, of so many events at most, and as long as its motion is the only one."""
     end = time_of_event(made.setup, EVENTS)
-    return replace(made, setup=replace(made.setup, duration_s=end, record_period_s=end / 20))
+    return replace(made, setup=replace(made.setup, duration_s=end, record_every_s=end / 20))
 
 
 def meet(seed: int, index: int) -> Answer:

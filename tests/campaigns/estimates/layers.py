@@ -21,7 +21,7 @@ from tests.campaigns.estimates.judge import Judgement, judged
 from tests.campaigns.estimates.scenes import Scene
 
 LAWS = ("dry", "dry", "tanh", "lugre")  # Stribeck's curve twice: it is half of all scenes
-METHODS = ("rk4", "midpoint", "order_8", "rosenbrock_5", "rk4")
+METHODS = ("RK4", "Midpoint", "DP8", "Rodas5PFixed", "RK4")
 MASS = 1.9
 SLIDER = f"""<robot name="slider"><link name="base"/><link name="block"><inertial><mass value="{MASS}"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
@@ -57,7 +57,7 @@ def slide(
     robot = rd.Robot.from_text(SLIDER).with_(gravity=(0.0, 0.0, 0.0))
     plant = rd.Plant(robot, [rd.effects.Spring(stiffness, 0.0), friction])
     return rd.Setup(
-        plant, [q], [v], duration, integrator=method, step_s=step, record_period_s=duration / 20, engine="compiled"
+        plant, [q], [v], duration, method=method, step_s=step, record_every_s=duration / 20, engine="compiled"
     )
 
 

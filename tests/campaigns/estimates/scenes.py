@@ -11,8 +11,8 @@ import robot_dyn as rd
 
 FAMILIES = ("smooth", "smooth", "friction", "impact", "sampled", "window")  # smooth twice: a third of all scenes
 METHODS = (
-    "explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "rk4", "order_8", "gauss_2", "gauss_4", "gauss_6",
-    "rosenbrock_5", "rosenbrock_5",
+    "Euler", "SemiImplicitEuler", "Midpoint", "RK4", "RK4", "DP8", "GaussLegendre2", "GaussLegendre4", "GaussLegendre6",
+    "Rodas5PFixed", "Rodas5PFixed",
 )  # fmt: skip
 RAIL = """<robot name="rail"><link name="base"/><link name="block"><inertial><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
@@ -74,7 +74,7 @@ def scene(seed: int, index: int, of: str = "") -> Scene:
         method = rd.integrate.Adaptive(rtol=10 ** rng.uniform(-11, -5), atol=10 ** rng.uniform(-13, -8))
         text = f"DOP853 {method.rtol:.0e}"
     else:
-        method = rd.integrate.method("rk4" if arm.n > 2 else str(rng.choice(METHODS)))
+        method = rd.integrate.method("RK4" if arm.n > 2 else str(rng.choice(METHODS)))
         text = method.name
     step = float(np.round(10 ** rng.uniform(-3.4, -1.9), 6))
     fixed = {} if isinstance(method, rd.integrate.Adaptive) else {"step_s": step}

@@ -14,7 +14,7 @@ from tests.wrong_arguments import NOT_NUMBERS, NOT_OBJECTS, examples
 
 # These open files, browsers and compilers, or take long by themselves; their arguments are tried one by one elsewhere.
 SLOW = {
-    "Compiled", "compare", "euler_lagrange", "list_robots", "load", "read",
+    "compiled", "compare", "euler_lagrange", "list_robots", "load", "read",
     "plot", "read_scene", "replay", "rollouts", "Adaptive.solve", "Rollouts.save", "Trajectory.save",
     "show", "simulate", "linearise",
 }  # fmt: skip

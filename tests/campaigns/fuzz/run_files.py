@@ -34,7 +34,7 @@ def seeds(folder: Path) -> list[bytes]:
         path = folder / f"{name}.toml"
         path.write_text(starter(name).replace(duration, "0.1", 1), encoding="utf-8")
         runs.append(rd.simulate(rd.read_scene(path)))
-    runs.append(replace(runs[0], at_stop=runs[0].q > 0, desired=runs[0].q, deviation=runs[0].v))
+    runs.append(replace(runs[0], at_stop=runs[0].q > 0, desired=runs[0].q, tracking_error=runs[0].v))
     return [run.save(folder / f"seed{k}.npz").read_bytes() for k, run in enumerate(runs)]
 
 

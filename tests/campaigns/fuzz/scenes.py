@@ -13,7 +13,7 @@ from tests.campaigns.fuzz.bytes import damage, damage_text
 # Parts that no starter has; `double_pendulum` is left out of none, so that every kind meets a small robot too.
 MORE = """robot = "cart_pole"
 duration_s = 0.1
-method = "rk4"
+method = "RK4"
 start = {q = {hinge = 0.3}, v = [0.1, 0.2]}
 [[effect]]
 kind = "lock"

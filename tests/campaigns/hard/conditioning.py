@@ -59,7 +59,7 @@ def implementations(robot: rd.Robot, compiled: bool) -> dict[str, Any]:
     known: dict[str, Any] = {"Lagrangian": rd.Lagrangian(robot)}
     if not any("below 1e-12 kg" in each for each in robot.findings):
         known["Pinocchio"] = robot
-    return known | ({"machine code": rd.Compiled(robot)} if compiled else {})
+    return known | ({"machine code": rd.compiled(robot)} if compiled else {})
 
 
 class Error(NamedTuple):

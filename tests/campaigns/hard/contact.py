@@ -148,7 +148,7 @@ def _set_valued(name: str, block: range, case: str, seed: int) -> Iterator[Row]:
 
 def _stepped(made: Scene, count: int) -> rd.Trajectory:
     setup = replace(
-        made.setup, integrator="time_stepping", step_s=made.setup.duration_s / count, record_period_s=0.0,
+        made.setup, method="MoreauJean", step_s=made.setup.duration_s / count, record_every_s=0.0,
         engine="interpreted",
     )  # fmt: skip
     return rd.simulate(setup)

@@ -1,7 +1,7 @@
 """Angles of 1e16 rad, velocities whose squares nearly overflow, denormals, NaN and infinity beside numbers.
 
 A float of 1e16 rad is one angle, whose sine is known; terms grow as v². What has a finite answer gets it, to 32 n u of
-the terms added, as under Conditioning; what overflows is refused by name. In a batch with errors="nan" the rows
+the terms added, as under Conditioning; what overflows is refused by name. In a batch by nan_rows the rows
 beside one without an answer have the bits of the batch with a finite row in its place; else the row is named, and
 `out` is as it was.
 """
@@ -43,7 +43,7 @@ def loaded(name: str) -> rd.Robot:
 
 def implementations(robot: rd.Robot) -> Implementations:
     """Of a robot whose right angles are written out in full."""
-    engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
+    engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.compiled(robot)}
     return Implementations(robot, engines, rd.Lagrangian(robot, rd.accuracy.Ball(BITS)))
 
 
@@ -113,7 +113,7 @@ def beside(name: str, of: Implementations, bad: float, seed: int) -> Iterator[Ro
         changed, named = 0, 0
         for query, rest in asked:
             ask = getattr(engine, query)
-            whole, made = ask(q, *rest), ask(marred, *rest, errors="nan")
+            whole, made = ask(q, *rest), getattr(engine.nan_rows, query)(marred, *rest)
             changed += int(np.sum(made[others] != whole[others])) + int(np.sum(~np.isnan(made[SPOILT])))
             named += _is_named(partial(ask, marred, *rest))
         case = f"{name}: a row with {bad}"

@@ -30,8 +30,8 @@ from tests.campaigns.hard.case import Case, Row
 TITLE = "Long runs"
 U, STARTS, SAMPLES = 2.0**-53, 16, 200
 ERRORS, EXPONENT, WALK, FAST = 3.0, 0.3, 10.0, 10.0
-ORDER = {"gauss_2": 2, "gauss_4": 4, "gauss_6": 6, "rk4": 4, "order_8": 8}
-STEPS = {"gauss_2": 0.01, "gauss_4": 0.02, "gauss_6": 0.04, "rk4": 0.02, "order_8": 0.05}  # [s]
+ORDER = {"GaussLegendre2": 2, "GaussLegendre4": 4, "GaussLegendre6": 6, "RK4": 4, "DP8": 8}
+STEPS = {"GaussLegendre2": 0.01, "GaussLegendre4": 0.02, "GaussLegendre6": 0.04, "RK4": 0.02, "DP8": 0.05}  # [s]
 PACE = {"planar_2r": 1.0, "ur5": 1.0, "panda": 0.125, "body": 4.0}  # of these steps: how slowly it moves
 SAME = {"panda": 5.0}  # [s] in which motions of two steps are the same; what tumbles longer has its own largest error
 NAMES = {"planar_2r": "double pendulum", "ur5": "UR5", "panda": "Panda", "body": "torque-free body"}
@@ -78,8 +78,8 @@ def energies(name: str, method: str, step: float, steps: int, seed: int) -> tupl
     """E − E₀ at the samples, (16, m), and the largest |K| + |V| of each run."""
     q0, v0 = starts(name, seed)
     runs = rd.rollouts(
-        arm(name), q0, v0, duration_s=steps * step, integrator=method, step_s=step, record=("energy",),
-        record_period_s=steps * step / SAMPLES, threads=1,
+        arm(name), q0, v0, duration_s=steps * step, method=method, step_s=step, record=("energy",),
+        record_every_s=steps * step / SAMPLES, threads=1,
     )  # fmt: skip
     assert runs.kinetic is not None and runs.potential is not None
     energy = runs.kinetic + runs.potential
@@ -130,7 +130,7 @@ def _rounded(name: str, method: str, step: float, steps: int, seed: int) -> Iter
 
 def _back(name: str, method: str, step: float, steps: int, seed: int) -> Iterator[Row]:
     robot, (q0, v0) = arm(name), starts(name, seed)
-    options = {"duration_s": steps * step, "integrator": method, "step_s": step, "record_period_s": steps * step}
+    options = {"duration_s": steps * step, "method": method, "step_s": step, "record_every_s": steps * step}
     there = rd.rollouts(robot, q0, v0, threads=1, **options)
     back = rd.rollouts(robot, there.q[:, -1], -there.v[:, -1], threads=1, **options)
     off = float(np.abs(back.q[:, -1] - q0).max())
@@ -143,8 +143,8 @@ def _momentum(method: str, steps: int, seed: int) -> Iterator[Row]:
     """The vertical angular momentum M₁ v of the body, by Pinocchio."""
     step, robot, (q0, v0) = step_of("body", method), arm("body"), starts("body", seed)
     runs = rd.rollouts(
-        robot, q0, v0, duration_s=steps * step, integrator=method, step_s=step, threads=1,
-        record_period_s=steps * step / SAMPLES,
+        robot, q0, v0, duration_s=steps * step, method=method, step_s=step, threads=1,
+        record_every_s=steps * step / SAMPLES,
     )  # fmt: skip
     vertical = np.einsum("...ij,...j->...i", robot.M(runs.q), runs.v)[..., 0]
     off = np.abs(vertical - vertical[:, :1]).max() / np.abs(vertical[:, 0]).max()
@@ -153,34 +153,42 @@ def _momentum(method: str, steps: int, seed: int) -> Iterator[Row]:
 
 
 STEPS_OF = {  # of the full form: some 4 minutes on one core at most
-    "planar_2r": {"gauss_2": 10**7, "gauss_4": 5 * 10**6, "gauss_6": 3 * 10**6, "rk4": 10**6, "order_8": 10**6},
-    "body": {"gauss_2": 10**6, "gauss_4": 10**6, "gauss_6": 10**6, "rk4": 10**5, "order_8": 10**5},
-    "ur5": {"gauss_2": 10**5, "gauss_4": 10**5, "gauss_6": 10**5, "rk4": 10**4, "order_8": 10**4},
-    "panda": {"gauss_2": 10**5, "gauss_4": 10**5, "gauss_6": 10**5},
+    "planar_2r": {
+        "GaussLegendre2": 10**7,
+        "GaussLegendre4": 5 * 10**6,
+        "GaussLegendre6": 3 * 10**6,
+        "RK4": 10**6,
+        "DP8": 10**6,
+    },
+    "body": {"GaussLegendre2": 10**6, "GaussLegendre4": 10**6, "GaussLegendre6": 10**6, "RK4": 10**5, "DP8": 10**5},
+    "ur5": {"GaussLegendre2": 10**5, "GaussLegendre4": 10**5, "GaussLegendre6": 10**5, "RK4": 10**4, "DP8": 10**4},
+    "panda": {"GaussLegendre2": 10**5, "GaussLegendre4": 10**5, "GaussLegendre6": 10**5},
 }
 
 
 def _case(name: str, method: str, steps: int, full: bool = True) -> Case:
-    run = _symplectic if method.startswith("gauss") else _explicit
+    run = _symplectic if method.startswith("GaussLegendre") else _explicit
     return Case(f"{NAMES[name]}, {method}, {steps:g} steps", partial(run, name, method, steps), full)
 
 
 def _short_steps(steps: int, full: bool = True) -> Case:
-    made = partial(_rounded, "planar_2r", "gauss_6", 2e-3, steps)
-    return Case(f"double pendulum, gauss_6, {steps:g} short steps", made, full)
+    made = partial(_rounded, "planar_2r", "GaussLegendre6", 2e-3, steps)
+    return Case(f"double pendulum, GaussLegendre6, {steps:g} short steps", made, full)
 
 
 def _there_and_back(steps: int, full: bool = True) -> Case:
-    return Case(f"double pendulum, {steps:g} steps and back", partial(_back, "planar_2r", "gauss_4", 0.01, steps), full)
+    return Case(
+        f"double pendulum, {steps:g} steps and back", partial(_back, "planar_2r", "GaussLegendre4", 0.01, steps), full
+    )
 
 
 CASES = [
-    _case("planar_2r", "gauss_4", 20_000, False),
-    _case("planar_2r", "rk4", 20_000, False),
+    _case("planar_2r", "GaussLegendre4", 20_000, False),
+    _case("planar_2r", "RK4", 20_000, False),
     _short_steps(20_000, False),
     _there_and_back(2_000, False),
     *(_case(name, method, steps) for name, of in STEPS_OF.items() for method, steps in of.items()),
     _short_steps(10**7),
     _there_and_back(10**6),
-    Case("torque-free body, momentum over 1e+06 steps", partial(_momentum, "gauss_4", 10**6), True),
+    Case("torque-free body, momentum over 1e+06 steps", partial(_momentum, "GaussLegendre4", 10**6), True),
 ]

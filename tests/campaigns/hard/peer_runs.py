@@ -135,8 +135,8 @@ def energy(seed: int) -> Iterator[Row]:
         "planar_2r, free, 10 s", "energy, relative", 1e-9, drift,
         {
             f"{OURS}, default": lambda: ours(robot, q0, 10.0, []),
-            f"{OURS}, gauss_4, 1 ms": lambda: ours(robot, q0, 10.0, [], integrator="gauss_4", step_s=STEP_S),
-            f"{OURS}, rk4, 1 ms": lambda: ours(robot, q0, 10.0, [], integrator="rk4", step_s=STEP_S),
+            f"{OURS}, GaussLegendre4, 1 ms": lambda: ours(robot, q0, 10.0, [], method="GaussLegendre4", step_s=STEP_S),
+            f"{OURS}, RK4, 1 ms": lambda: ours(robot, q0, 10.0, [], method="RK4", step_s=STEP_S),
             "MuJoCo, RK4, 1 ms": lambda: mujoco(robot, q0, 10.0, rk4),
             "Drake, runge_kutta5, accuracy 1e-10": lambda: drake(robot, q0, 10.0, "runge_kutta5"),
             "PyBullet, 1 ms": lambda: bullet(robot, q0, 10.0, 0.0, 0.0),
@@ -158,8 +158,8 @@ def oil(seed: int) -> Iterator[Row]:
         "a pendulum in oil, c = 1e4, 10 s", "q, rad", 1e-6, lambda end: abs(end.q[0] - known),
         {
             f"{OURS}, default": lambda: ours(robot, [start], duration, effects),
-            f"{OURS}, gauss_4, 1 ms": lambda: ours(
-                robot, [start], duration, effects, integrator="gauss_4", step_s=STEP_S
+            f"{OURS}, GaussLegendre4, 1 ms": lambda: ours(
+                robot, [start], duration, effects, method="GaussLegendre4", step_s=STEP_S
             ),
             "MuJoCo, implicitfast, 1 ms": lambda: mujoco(robot, start, duration, implicit),
             "Drake, radau3, accuracy 1e-10": lambda: drake(robot, start, duration, "radau3", c),
@@ -185,8 +185,8 @@ def rest(seed: int) -> Iterator[Row]:
         "a block held by friction 1 % above its weight, 10 s", "moved, m", 0.0, lambda end: abs(end.q[0]),
         {
             f"{OURS}, default": lambda: ours(robot, [0.0], 10.0, [rd.effects.DryFriction(force)]),
-            f"{OURS}, time_stepping, 1 ms": lambda: ours(
-                robot, [0.0], 10.0, [rd.effects.DryFriction(force)], integrator="time_stepping", step_s=STEP_S
+            f"{OURS}, MoreauJean, 1 ms": lambda: ours(
+                robot, [0.0], 10.0, [rd.effects.DryFriction(force)], method="MoreauJean", step_s=STEP_S
             ),
             "MuJoCo, frictionloss, solref 2 h, solimp 0.9999, 1 ms": lambda: mujoco(robot, 0.0, 10.0, stiffest),
             "Drake, runge_kutta5, accuracy 1e-10": no_friction,
@@ -209,8 +209,8 @@ def stopped(seed: int) -> Iterator[Row]:
         "a block that falls on a stop, 2 s", "from the stop at the end, m", 1e-9, lambda end: abs(end.q[0] + FALL),
         {
             f"{OURS}, default": lambda: ours(robot, [0.0], 2.0, stops),
-            f"{OURS}, time_stepping, 1 ms": lambda: ours(
-                robot, [0.0], 2.0, stops, integrator="time_stepping", step_s=STEP_S
+            f"{OURS}, MoreauJean, 1 ms": lambda: ours(
+                robot, [0.0], 2.0, stops, method="MoreauJean", step_s=STEP_S
             ),
             "MuJoCo, solref 2 h, solimp 0.9999, 1 ms": lambda: mujoco(robot, 0.0, 2.0, limited),
             "PyBullet, 1 ms": lambda: bullet(robot, 0.0, 2.0, 0.0, 0.0, -FALL),

@@ -53,8 +53,8 @@ def run_at(arm: rd.Robot, q: np.ndarray, law: rd.control.Controller, period: flo
     """A run of 1500 periods, and how far it is from q in its last tenth over how far it was at its start."""
     start = q + START * np.cos(3.0 * np.arange(arm.n) + 1.0)
     run = rd.simulate(
-        arm, start, duration_s=PERIODS * period, controller=law.at_period(period), integrator="rk4", step_s=period,
-        record_period_s=period, estimate_error=False,
+        arm, start, duration_s=PERIODS * period, controller=law.at_period(period), method="RK4", step_s=period,
+        record_every_s=period, estimate_error=False,
     )  # fmt: skip
     if run.outcome.ending != "finished":
         return run, np.inf
@@ -94,9 +94,9 @@ def _wound_up(name: str, seed: int) -> Iterator[Row]:
         q,
         duration_s=2.0,
         controller=law,
-        integrator="rk4",
+        method="RK4",
         step_s=1e-3,
-        record_period_s=1e-3,
+        record_every_s=1e-3,
         estimate_error=False,
     )
     e, z = np.abs(q + 1.0 - run.q), np.abs(run.controller_states)

@@ -149,7 +149,7 @@ def _path(name: str, path: Path, seed: int) -> Iterator[Row]:
     robot, rng = arm(path.robot), np.random.default_rng((31, seed))
     start = np.array(path.start) + rng.uniform(-0.03, 0.03, robot.n)
     beside, other = parallel(robot, path, start)
-    options = {"duration_s": 1.5, "record_period_s": 2e-3, "estimate_error": False}
+    options = {"duration_s": 1.5, "record_every_s": 2e-3, "estimate_error": False}
     law = control(robot, path, reference(robot, path, start), start)
     run = rd.simulate(robot, start, controller=law, **options)
     away = rd.simulate(robot, other, controller=control(robot, path, beside, other), **options)

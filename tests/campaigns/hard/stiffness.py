@@ -26,7 +26,7 @@ from tests.campaigns.hard.stiff_motion import SAMPLES, Motion, damper, dry, of_a
 TITLE = "Stiffness"
 ASKED, TIMES, LEAST = 1e-6, 10.0, 0.3
 STEP = 1e-3  # [s]
-IMPLICIT = "rosenbrock_5", "gauss_2", "gauss_4"
+IMPLICIT = "Rodas5PFixed", "GaussLegendre2", "GaussLegendre4"
 ROUNDING = 1e-9  # [rad], below which the truth of an arm cannot tell
 
 
@@ -39,12 +39,12 @@ def true_error(run: rd.Trajectory, motion: Motion) -> float:
 
 def rows(case: str, make: Callable[[], Motion], engine: str, seed: int) -> Iterator[Row]:
     motion = make()
-    setup = replace(motion.setup, record_period_s=motion.setup.duration_s / SAMPLES, engine=engine)
+    setup = replace(motion.setup, record_every_s=motion.setup.duration_s / SAMPLES, engine=engine)
     yield _asked(case, motion, setup)
     yield _controlled(case, motion, setup)
     for name in IMPLICIT:
-        yield _fixed(case, name, motion, replace(setup, integrator=name, step_s=STEP))
-    yield from _explicit(case, motion, replace(setup, integrator="rk4", step_s=STEP))
+        yield _fixed(case, name, motion, replace(setup, method=name, step_s=STEP))
+    yield from _explicit(case, motion, replace(setup, method="RK4", step_s=STEP))
 
 
 def _asked(case: str, motion: Motion, setup: rd.Setup) -> Row:
@@ -57,11 +57,11 @@ def _asked(case: str, motion: Motion, setup: rd.Setup) -> Row:
 
 
 def _controlled(case: str, motion: Motion, setup: rd.Setup) -> Row:
-    run = rd.simulate(setup, integrator=rd.integrate.Adaptive("Rosenbrock", ASKED, ASKED / 100))
+    run = rd.simulate(setup, method=rd.integrate.Adaptive("Rodas5P", ASKED, ASKED / 100))
     error = true_error(run, motion)
     scale = ASKED * float(np.abs(run.q).max()) + ASKED / 100
     said = str(run.error) if run.error.at(run.error.until_s) >= LEAST * error else ""
-    return Row(case, f"Rosenbrock of rtol {ASKED:g}: true error over tolerance", error / scale, TIMES, said)
+    return Row(case, f"Rodas5P of rtol {ASKED:g}: true error over tolerance", error / scale, TIMES, said)
 
 
 def _fixed(case: str, name: str, motion: Motion, setup: rd.Setup) -> Row:
@@ -77,20 +77,20 @@ def _fixed(case: str, name: str, motion: Motion, setup: rd.Setup) -> Row:
 
 def _explicit(case: str, motion: Motion, setup: rd.Setup) -> Iterator[Row]:
     """At a step that may be far beyond stability, and as advised."""
-    yield _fixed(case, "rk4", motion, setup)
+    yield _fixed(case, "RK4", motion, setup)
     try:
         advice = rd.advise(setup)
     except RobotDynError as refusal:
-        yield Row(case, "rk4 as advised: true error over estimate", float("nan"), 1 / LEAST, str(refusal))
+        yield Row(case, "RK4 as advised: true error over estimate", float("nan"), 1 / LEAST, str(refusal))
         return
     if advice.stable:
         return
-    limit = advice.limits["rk4"]
+    limit = advice.limits["RK4"]
     others = [name for name, h in advice.limits.items() if h >= STEP]
     if others:
-        yield _fixed(case, f"{others[0]}, as advised for rk4,", motion, replace(setup, integrator=others[0]))
+        yield _fixed(case, f"{others[0]}, as advised for RK4,", motion, replace(setup, method=others[0]))
     if setup.duration_s / limit < 20_000:
-        yield _fixed(case, "rk4 at half the limit", motion, replace(setup, step_s=limit / 2))
+        yield _fixed(case, "RK4 at half the limit", motion, replace(setup, step_s=limit / 2))
 
 
 def _driven(name: str, k: float) -> Motion:

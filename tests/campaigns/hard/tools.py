@@ -73,7 +73,7 @@ def part(robot: rd.Robot, quantity: Quantity, state: dict[str, np.ndarray], one:
 def batches(robot: rd.Robot, seed: int) -> Iterator[Row]:
     """A batch against its states one by one, and two threads against one."""
     given, name = states(robot.n, seed), robot.name
-    one, two = rd.Compiled(robot), rd.Compiled(robot, threads=2)
+    one, two = rd.compiled(robot), rd.compiled(robot, threads=2)
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": one}
     for implementation, engine in engines.items():
         worst = 0.0
@@ -91,7 +91,7 @@ def batches(robot: rd.Robot, seed: int) -> Iterator[Row]:
 def digest(name: str, seed: str, kept: str = "") -> str:
     """Of all answers of machine code, taken from the cache where `kept` is not empty."""
     robot = rd.load(name)
-    made, hashed = rd.Compiled(robot, cache=bool(kept)), hashlib.sha256()
+    made, hashed = rd.compiled(robot, cache=bool(kept)), hashlib.sha256()
     for quantity in queries(robot):
         hashed.update(quantity.ask(made, states(robot.n, int(seed))).tobytes())
     return hashed.hexdigest()
@@ -130,7 +130,7 @@ def engines(name: str, seed: int) -> Iterator[Row]:
     q, v = np.random.default_rng((37, seed)).uniform(-0.5, 0.5, (2, TILE, robot.n))
     inertia = np.diag(robot.M(q[0]))  # gains in its units are as slow on every arm
     setup = rd.Setup(
-        rd.Plant(robot, [rd.effects.ViscousFriction(inertia)]), q[0], v[0], duration_s=STEPS * 1e-3, integrator="rk4",
+        rd.Plant(robot, [rd.effects.ViscousFriction(inertia)]), q[0], v[0], duration_s=STEPS * 1e-3, method="RK4",
         controller=rd.control.PD(rd.control.hold(q[0]), 25 * inertia, 2 * inertia, period_s=5e-3), step_s=1e-3,
         estimate_error=False,
     )  # fmt: skip

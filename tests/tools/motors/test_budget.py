@@ -321,7 +321,7 @@ def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() ->
     t = np.linspace(0, fast.duration, 10_000)
     q, v, a = fast.plan.reference.at(t)
     loaded = rd.Plant(UR5.with_(payload=LOAD), FRICTION[:1])
-    assert (np.abs(loaded.inverse_dynamics(0.0, q, v, a)) <= 1.001 * UR5.effort_limit).all()
+    assert (np.abs(loaded.inverse_dynamics(q, v, a, t=0.0)) <= 1.001 * UR5.effort_limit).all()
     assert (np.abs(v) <= 1.001 * UR5.velocity_limit).all()
     at_rest = np.abs(v).max(axis=1) == 0
     assert at_rest.mean() * fast.duration == pytest.approx(0.4, abs=1e-3)

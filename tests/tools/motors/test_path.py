@@ -55,7 +55,7 @@ def test_no_torque_is_above_its_limit_and_nearly_always_one_limit_binds(name: st
     plant = rd.Plant(robot, effects)
     found = rd.tools.motors.path(plant, _way_points(robot, seed=3))
     q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
-    torque = np.abs(plant.inverse_dynamics(0.0, q, v, a)) / robot.effort_limit
+    torque = np.abs(plant.inverse_dynamics(q, v, a, t=0.0)) / robot.effort_limit
     speed = np.abs(v) / robot.velocity_limit
     assert torque.max() <= 1.001
     assert speed.max() <= 1.001
@@ -159,7 +159,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
         WAY[0],
         duration_s=found.duration,
         controller=controller,
-        integrator="rk4",
+        method="RK4",
         step_s=2e-3,
         engine="interpreted",
         estimate_error=False,

@@ -490,7 +490,7 @@ def test_a_reference_may_pass_from_one_polynomial_to_another() -> None:
     setup = rd.Setup(rd.Plant(robot), [0.31, -0.42], duration_s=0.08, controller=rd.control.PD(plan, 100.0, 10.0))
     made, run = (
         rd.tools.proof.prove(setup),
-        rd.simulate(replace(setup, integrator=rd.integrate.Adaptive("DOP853", 1e-13, 1e-14))),
+        rd.simulate(replace(setup, method=rd.integrate.Adaptive("DOP853", 1e-13, 1e-14))),
     )
     assert made.proven and {0.01, float(plan.end), 0.08} <= {node.t for node in made.nodes}
     assert run.proven_digits(made) > 11

@@ -96,7 +96,7 @@ def test_each_limit_is_confirmed_or_said(name: str) -> None:
     assert {each.of for each in result.limits} == {"step", "gain", "speed", "payload"}
     assert result.failures == () and result.ok
     of_steps = [each for each in result.limits if each.of == "step"]
-    assert {each.what for each in of_steps if each.confirmed} >= {"explicit_euler", "midpoint", "rk4", "order_8"}
+    assert {each.what for each in of_steps if each.confirmed} >= {"Euler", "Midpoint", "RK4", "DP8"}
     assert all("iteration of its stages" in each.what for each in of_steps if not each.confirmed)
 
 
@@ -111,7 +111,7 @@ def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
     monkeypatch.setattr(limits, "advice_about", wrong)
     result = rd.tools.stress.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
     refuted = {each.what for each in result.limits if each.confirmed is False}
-    assert {"explicit_euler", "midpoint", "rk4", "order_8"} <= refuted
+    assert {"Euler", "Midpoint", "RK4", "DP8"} <= refuted
     assert not result.ok and len(result.failures) == len(refuted) and "is refuted" in result.failures[0]
 
 
@@ -128,12 +128,12 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
     monkeypatch.setattr(runs, "simulate", boastful)
     robot = rd.load("planar_2r")
     setup = rd.Setup(
-        rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, integrator="midpoint", step_s=2e-3,
-        record_period_s=0.02,
+        rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, method="Midpoint", step_s=2e-3,
+        record_every_s=0.02,
     )  # fmt: skip
     found = runs.judged(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
-    assert runs.judged(replace(setup, integrator="order_8"), "swing", Budget()).misleads is False  # rounding
+    assert runs.judged(replace(setup, method="DP8"), "swing", Budget()).misleads is False  # rounding
     small = runs.shrunk_run(found, "shrinking", Work())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
@@ -176,7 +176,7 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
 
 def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
     """Gains of the PD by which steps are judged."""
-    law = next(each.setups[0].controller for each in result.limits if each.of == "step" and each.what == "rk4")
+    law = next(each.setups[0].controller for each in result.limits if each.of == "step" and each.what == "RK4")
     return law.kp, law.kd
 
 
@@ -281,7 +281,7 @@ def test_with_time_enough_what_is_found_depends_on_no_clock() -> None:
 
 def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estimate() -> None:
     """They take more steps than the run: the clock stops them beyond its 100 steps, and before their end."""
-    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.4], duration_s=0.1, integrator="rk4", engine="interpreted")
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.4], duration_s=0.1, method="RK4", engine="interpreted")
     for most, done in ((50, False), (150, False), (1e6, True)):
         work = Work(Budget(most, clock=ticking()))
         run = work.do("run", lambda until: rd.simulate(setup, on_progress=until.check))
@@ -316,7 +316,7 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
     found = {
         each.what: each for each in islice(filter(None, limits.step_limits(setup, 0, Work())), 4)
     }  # the explicit ones
-    assert found["explicit_euler"].value == pytest.approx(2 * robot.M(np.array([0.3]))[0, 0] / 5, rel=0.01)
+    assert found["Euler"].value == pytest.approx(2 * robot.M(np.array([0.3]))[0, 0] / 5, rel=0.01)
     assert all(each.confirmed for each in found.values())
 
 
@@ -324,7 +324,7 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     """Steps beyond their limit: the run leaves the equilibrium, and admits that."""
     robot = rd.load("pendulum")
     law = rd.control.PDGravity(robot, rd.control.hold([0.4]), 133.0, 13.3)
-    setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
+    setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, method="Midpoint", step_s=0.11)
     pushed = limits.run_from_near(setup, np.array([0.4]), Budget(), True)
     assert pushed.growth > 30 and not pushed.misleads  # it says so
 

@@ -16,9 +16,9 @@ pytest.importorskip("pyarrow")
 SCENE = """
 robot = "planar_2r"
 duration_s = 0.05
-method = "rk4"
+method = "RK4"
 step_s = 0.001
-record_period_s = 0.001
+record_every_s = 0.001
 
 [start]
 q = [0.4, 0.9]
@@ -44,7 +44,7 @@ VARY = {
     "mass_scale": sw.normal(mean=1.0, sd=0.45),  # 1.3 % are negative, which is refused
     "kd": sw.choice([4.0, 4000.0]),  # too much for the step
 }
-FIGURES = {"error": sw.rms_error(), "peak": sw.peak("v"), "end": sw.final("q", "joint_2")}
+FIGURES = {"error": sw.rms_tracking_error(), "peak": sw.peak("v"), "end": sw.final("q", "joint_2")}
 
 
 def scene(folder: Path, text: str = SCENE) -> Path:

@@ -51,9 +51,9 @@ SCENES = {
     "plain": SCENE,
     "noise": NOISY,
     "stops": SCENE.replace("[control]", STOPS),
-    "steps that are chosen": SCENE.replace('method = "rk4"\nstep_s = 0.001\n', ""),
+    "steps that are chosen": SCENE.replace('method = "RK4"\nstep_s = 0.001\n', ""),
     "samples between steps": SCENE.replace("[control]", STOPS).replace(
-        "record_period_s = 0.001", "record_period_s = 0.0017"
+        "record_every_s = 0.001", "record_every_s = 0.0017"
     ),
 }
 
@@ -69,7 +69,7 @@ def test_a_run_by_itself_has_the_bits_of_its_row(tmp_path: Path, name: str) -> N
         assert run.q[-1, 1] == rows["end"][i]
         assert np.abs(run.extremes[1]).max() == rows["peak"][i]
         assert run.q[0].tolist() == [rows["q0[0]"][i], rows["q0[1]"][i]]
-        assert run.tracking_error == pytest.approx(rows["error"][i], rel=1e-12)  # another order of the sum
+        assert run.rms_tracking_error == pytest.approx(rows["error"][i], rel=1e-12)  # another order of the sum
 
 
 def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
@@ -82,10 +82,10 @@ def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
         gains = rd.control.PD(controller.desired, rows["kp"][i], controller.kd)
         q0 = [rows["q0[0]"][i], rows["q0[1]"][i]]
         run = rd.simulate(
-            setup.plant, q0, controller=gains, duration_s=setup.duration_s, integrator="rk4", step_s=0.001,
-            record_period_s=0.001, estimate_error=False,
+            setup.plant, q0, controller=gains, duration_s=setup.duration_s, method="RK4", step_s=0.001,
+            record_every_s=0.001, estimate_error=False,
         )  # fmt: skip
-        assert run.tracking_error == pytest.approx(rows["error"][i], rel=1e-9)
+        assert run.rms_tracking_error == pytest.approx(rows["error"][i], rel=1e-9)
         assert run.q[-1, 1] == pytest.approx(rows["end"][i], rel=1e-9)
         assert np.abs(run.v).max() == pytest.approx(rows["peak"][i], rel=1e-9)
 
@@ -104,7 +104,7 @@ def test_rollouts_numbered_otherwise_are_those_runs() -> None:
     arm = rd.load("planar_2r")
     hold = rd.control.quintic([0.1, 0.2], [0.3, 0.1], 0.05)
     loop = rd.control.Loop(rd.control.PD(hold, 40.0, 4.0, period_s=0.005), position=rd.control.Noise(0.01), seed=1)
-    setup = rd.Setup(rd.Plant(arm), [0.1, 0.2], duration_s=0.05, controller=loop, integrator="rk4")
+    setup = rd.Setup(rd.Plant(arm), [0.1, 0.2], duration_s=0.05, controller=loop, method="RK4")
     whole = rd.rollouts(setup, np.tile([0.1, 0.2], (8, 1)))
     part = rd.rollouts(setup, np.tile([0.1, 0.2], (2, 1)), numbers=[5, 2])
     assert part.q.tobytes() == whole.q[[5, 2]].tobytes()

@@ -22,9 +22,9 @@ from tests.tools.sweeps.swept import SCENE, VARY, scene, swept
 WEAK = """
 robot = "planar_2r"
 duration_s = 0.2
-method = "rk4"
+method = "RK4"
 step_s = 0.002
-record_period_s = 0.02
+record_every_s = 0.02
 start = {q = [0.4, 0.3]}
 effect = [
   {kind = "gravity"},
@@ -57,7 +57,9 @@ def test_runs_that_fail_are_rows_with_a_reason(done: sw.SweepResult) -> None:
 def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
     """A weak motor, and friction that holds a joint in some runs; of each run alone, whatever the chunks."""
     path = scene(tmp_path, WEAK)
-    plan = sw.Sweep(str(path), 20, {"mass_scale": sw.uniform(low=0.2, high=3.0)}, {"error": sw.rms_error()}, seed=3)
+    plan = sw.Sweep(
+        str(path), 20, {"mass_scale": sw.uniform(low=0.2, high=3.0)}, {"error": sw.rms_tracking_error()}, seed=3
+    )
     done = sw.run(plan, tmp_path / "a", chunk=20)
     rows = done.table("mass_scale", "remarks")
     runs = rd.rollouts(plan.setup, params={"mass_scale": rows["mass_scale"]})
@@ -290,8 +292,8 @@ WRONG: dict[str, dict[str, Any]] = {
     "'a.settling' is not .*or an import path such as 'my_figures:settling'": {"figures": {"mine": "a.settling"}},
     "no figure 'settling'.*or an import path such as 'my_figures:settling'": {"figures": {"mine": "settling"}},
     "which other processes cannot import: write it to my_figures.py": {"figures": {"mine": lambda run: 0.0}},
-    "'diverged' is the name of another column": {"figures": {"diverged": sw.rms_error()}},
-    "'q0.0.' is the name of another column": {"figures": {"q0[0]": sw.rms_error()}},
+    "'diverged' is the name of another column": {"figures": {"diverged": sw.rms_tracking_error()}},
+    "'q0.0.' is the name of another column": {"figures": {"q0[0]": sw.rms_tracking_error()}},
     "needs a joint": {"figures": {"mine": sw.final("q")}},
     "no joint 'elbow'; known: joint_1, joint_2": {"figures": {"mine": sw.peak("u", "elbow")}},
     "the arm carries no payload": {"vary": {"payload_mass:tool0": sw.uniform(low=0, high=3)}},
@@ -325,13 +327,13 @@ def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tm
         "def setup():\n"
         "    arm = rd.load('planar_2r')\n"
         "    control = rd.control.PD(rd.control.hold([0.6, 0.9]), 40.0, 4.0)\n"
-        "    return rd.Setup(rd.Plant(arm), [0.4, 0.9], duration_s=0.1, controller=control, integrator='rk4',\n"
-        "                    events=rd.Event(reached, terminal=True), record_period_s=0.001)\n"
+        "    return rd.Setup(rd.Plant(arm), [0.4, 0.9], duration_s=0.1, controller=control, method='RK4',\n"
+        "                    events=rd.Event(reached, terminal=True), record_every_s=0.001)\n"
     )
     sys.path.insert(0, str(tmp_path))
     try:
         sweep = sw.Sweep("setup_with_an_event:setup", 24, {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)},
-                         {"error": sw.rms_error()}, seed=2)  # fmt: skip
+                         {"error": sw.rms_tracking_error()}, seed=2)  # fmt: skip
         rows = Work(sweep).rows(0, 24)
         assert len(set(rows["ended"].tolist())) > 2
         alone = [Work(sweep).rows(i, i + 1) for i in range(0, 24, 5)]
@@ -341,16 +343,21 @@ def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tm
 
 
 def test_a_scene_states_a_sweep_as_data(tmp_path: Path) -> None:
-    table = '\n[sweep]\nruns = 70\nvary = {kp = "uniform(low=10, high=20)"}\nfigures = {worst = "peak(\'error\')"}\n'
+    table = """
+[sweep]
+runs = 70
+vary = {kp = "uniform(low=10, high=20)"}
+figures = {worst = "peak('tracking_error')"}
+"""
     path = scene(tmp_path, SCENE + table)
     sweep = sw.from_scene(path, seed=3)
-    assert (sweep.runs, sweep.seed, sweep.figures) == (70, 3, {"worst": sw.peak("error")})
+    assert (sweep.runs, sweep.seed, sweep.figures) == (70, 3, {"worst": sw.peak("tracking_error")})
     for text, said in (
         ('"my_module:f"', "would run code, but a scene is data"),
         ("\"peak(__import__('os'))\"", "is not a name with numbers"),
         ("\"peek('u')\"", "no figure 'peek'; nearest: peak"),
     ):
-        path.write_text(SCENE + table.replace("\"peak('error')\"", text))
+        path.write_text(SCENE + table.replace("\"peak('tracking_error')\"", text))
         with pytest.raises(SweepError, match=said):
             sw.from_scene(path)
 
@@ -364,4 +371,7 @@ def test_units_of_figures_are_those_of_their_joints_and_of_a_frame() -> None:
     arm = rd.load("ur5")
     path = rd.control.circle([0.4, 0.2, 0.3], 0.05, [0.0, 0.0, 1.0], 2.0)
     follows = rd.control.OperationalSpace(arm, "tool0", path, 100.0, 20.0)
-    assert sw.rms_error().unit(rd.Setup(rd.Plant(arm), np.full(6, 0.3), duration_s=0.1, controller=follows)) == "m"
+    assert (
+        sw.rms_tracking_error().unit(rd.Setup(rd.Plant(arm), np.full(6, 0.3), duration_s=0.1, controller=follows))
+        == "m"
+    )

@@ -83,7 +83,7 @@ class ArmMotion:
     @cached_property
     def times(self) -> np.ndarray:
         """Times of the records, including the start, (k,), in [s]."""
-        period, end = self.setup.record_period_s, self.setup.duration_s
+        period, end = self.setup.record_every_s, self.setup.duration_s
         return np.append(period * np.arange(round(end / period)), end)
 
     @property
@@ -144,7 +144,7 @@ class ArmMotion:
             pairs = {
                 "M": (self.robot.M(q), mass_matrix(q)),
                 "N": (self.robot.inverse_dynamics(q, v, zero), bias(q, v)),
-                "the torques of control and effects": (plant.torque(t, q, v) + control, torque(t, q, v)),
+                "the torques of control and effects": (plant.torque(q, v, t=t) + control, torque(t, q, v)),
             }
             for what, (ours, theirs) in pairs.items():
                 differ = float(np.abs(ours - theirs).max() / (np.abs(ours).max() or 1.0))

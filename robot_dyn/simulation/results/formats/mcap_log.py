@@ -1,16 +1,16 @@
 """A run as an MCAP log of ROS 2 messages in CDR, by mcap and mcap-ros2-support.
 
-| topic | type | what it holds |
+| topic | type | contents |
 |---|---|---|
 | /joint_states | sensor_msgs/msg/JointState | q, v and u as position, velocity and effort |
 | /desired/joint_states | sensor_msgs/msg/JointState | desired positions |
-| /causes/NAME | sensor_msgs/msg/JointState | effort: the part of u that inertia, gravity, an effect … asks for |
-| /deviation/x, y, z | std_msgs/msg/Float64 | of a frame from its reference, in [m] |
-| /power/NAME, /energy, /residual | std_msgs/msg/Float64 | of the control and each effect, in [W]; in [J] |
+| /causes/NAME | sensor_msgs/msg/JointState | effort: the part of u for inertia, gravity, an effect, … |
+| /tracking_error/x, y, z | std_msgs/msg/Float64 | p_d − p of a frame, in [m] |
+| /power/NAME, /energy, /residual | std_msgs/msg/Float64 | power of the control and each effect, [W]; energies, [J] |
 
-Time 0 of the run is time 0 of the log, to 1 ns. A message is of all joints or of one number, and is written in the
-order of time. Units are in the metadata record "robot_dyn". The causes add up to u; runs that do not hold what their
-effects exerted have none, which the record says.
+Time 0 of the run is time 0 of the log, to 1 ns. A message contains all joints or one number; messages are in the order
+of time. Units are in the metadata record "robot_dyn". The causes add up to u; a run without recorded torques of its
+effects has none, and the record states the reason.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ uint32 nanosec
 """
 _NS = 10**9
 _LONGEST_S = 2.0**31  # seconds of a stamp are an int32
-_NUMBERS = ("deviation", "power", "energy", "residual")
+_NUMBERS = ("tracking error", "power", "energy", "residual")
 _STATE, _NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
 _DEFINITIONS = {_STATE: _JOINT_STATE, _NUMBER: "float64 data\n"}
 
@@ -59,7 +59,7 @@ def write(run: TrajectoryData, columns: list[Column], stream: BinaryIO) -> None:
     causes, missing = _causes(run)
     topics = [
         *_of_joints(run, stamps, causes),
-        *_of_numbers([each for each in columns if each.quantity in _NUMBERS]),
+        *_of_numbers([column for column in columns if column.quantity in _NUMBERS]),
     ]
     with needs("mcap_ros2.writer", extra=EXTRA).Writer(stream) as log:
         types = {name: log.register_msgdef(name, text) for name, text in _DEFINITIONS.items()}
@@ -70,7 +70,7 @@ def write(run: TrajectoryData, columns: list[Column], stream: BinaryIO) -> None:
 
 
 def _causes(run: TrajectoryData) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """The torque of the joints by cause, (m, n) each; and, without them, why."""
+    """Return the torque of the joints by cause, (m, n) each, or the reason why there is none."""
     try:
         return causes_of(run).torques, {}
     except QueryError as error:
@@ -78,16 +78,16 @@ def _causes(run: TrajectoryData) -> tuple[dict[str, np.ndarray], dict[str, str]]
 
 
 def _of_joints(run: TrajectoryData, stamps: Sequence[int], causes: dict[str, np.ndarray]) -> Iterator[Topic]:
-    none = np.empty((len(run.t), 0))  # fields that say nothing are empty, as sensor_msgs/JointState.msg has it
+    none = np.empty((len(run.t), 0))  # absent fields are empty, see sensor_msgs/JointState.msg
     yield "/joint_states", _STATE, _states(run, stamps, run.q, run.v, run.u)
     if run.desired is not None:
         yield "/desired/joint_states", _STATE, _states(run, stamps, run.desired, none, none)
-    for name, torque in zip(_names([f"/causes/{_word(each)}" for each in causes]), causes.values(), strict=True):
+    for name, torque in zip(_names([f"/causes/{_word(cause)}" for cause in causes]), causes.values(), strict=True):
         yield name, _STATE, _states(run, stamps, none, none, torque)
 
 
 def _states(run: TrajectoryData, stamps: Sequence[int], *values: np.ndarray) -> Iterator[Any]:
-    """Messages of position, velocity and effort, each (m, n) or (m, 0)."""
+    """Yield messages of position, velocity and effort, (m, n) or (m, 0) each."""
     names = list(run.joint_names)
     for ns, position, velocity, effort in zip(stamps, *values, strict=True):
         seconds, rest = divmod(ns, _NS)
@@ -101,22 +101,22 @@ def _states(run: TrajectoryData, stamps: Sequence[int], *values: np.ndarray) -> 
 
 
 def _of_numbers(columns: Sequence[Column]) -> Iterator[Topic]:
-    """A topic for each column."""
-    names = _names([f"/{each.quantity}" + f"/{_word(each.of)}" * bool(each.of) for each in columns])
-    for name, each in zip(names, columns, strict=True):
-        yield name, _NUMBER, ({"data": x} for x in each.values.tolist())
+    """Yield a topic for each column."""
+    names = _names([f"/{_word(column.quantity)}" + f"/{_word(column.of)}" * bool(column.of) for column in columns])
+    for name, column in zip(names, columns, strict=True):
+        yield name, _NUMBER, ({"data": x} for x in column.values.tolist())
 
 
 def _word(name: str) -> str:
-    """A name as ROS allows it: letters, digits and underscores."""
+    """Return a name of letters, digits and underscores, as ROS requires."""
     return re.sub("[^A-Za-z0-9_]+", "_", name)
 
 
 def _names(names: Sequence[str]) -> list[str]:
-    """The names, each once."""
+    """Return the names, made unique by numbers."""
     return [f"{name}_{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
 
 
 def _units(columns: Iterable[Column]) -> dict[str, str]:
-    """Units by heading without unit: those of q, v and u are of position, velocity and effort."""
-    return {f"unit of {each.quantity} {each.of}".rstrip(): each.unit for each in columns if each.unit}
+    """Return the units by heading without unit; q, v and u are position, velocity and effort."""
+    return {f"unit of {column.quantity} {column.of}".rstrip(): column.unit for column in columns if column.unit}

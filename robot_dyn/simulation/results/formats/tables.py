@@ -14,8 +14,8 @@ from robot_dyn.simulation.columns import EXTRA, Column, by_heading
 from robot_dyn.simulation.results.run_data import RunData, attributes
 from robot_dyn.simulation.results.run_file import RunFileError
 
-_ROWS = 4096  # of a block: as Python's numbers they take ten times the memory of arrays
-_LARGEST = 2**31 - 1  # netCDF-3 has no longer integers, and SciPy writes no larger variables in bytes
+_ROWS = 4096  # in a block: Python numbers take ten times the memory of arrays
+_LARGEST = 2**31 - 1  # largest integer of netCDF-3, and largest variable that SciPy writes, in bytes
 
 
 def write_csv(_: object, columns: list[Column], stream: BinaryIO) -> None:
@@ -41,15 +41,15 @@ def write_parquet(run: RunData, columns: list[Column], stream: BinaryIO) -> None
     table = by_heading(columns)
     arrays = [arrow.array(values) for values in table.values()]
     fields = [
-        arrow.field(name, array.type, metadata={"quantity": each.quantity, "of": each.of, "unit": each.unit})
-        for name, array, each in zip(table, arrays, columns, strict=True)
+        arrow.field(name, array.type, metadata={"quantity": column.quantity, "of": column.of, "unit": column.unit})
+        for name, array, column in zip(table, arrays, columns, strict=True)
     ]
     schema = arrow.schema(fields, metadata=attributes(run))
     needs("pyarrow.parquet", extra=EXTRA).write_table(arrow.Table.from_arrays(arrays, schema=schema), stream)
 
 
 def write_netcdf(run: RunData, _: object, stream: BinaryIO) -> None:
-    """Write the Dataset of a run, or of a batch."""
+    """Write the Dataset of a run or of a batch."""
     data = run.to_xarray()
     for name, x in data.data_vars.items():
         if x.dtype == np.int64:

@@ -116,7 +116,7 @@ class Judgement:
 def judged(plant: Plant, limits: Limits, motion: PiecewisePolynomial, t: np.ndarray) -> Judgement:
     """Compute the shares of a plant's limits that a motion uses, by inverse dynamics."""
     q, v, a = motion.at(t)
-    tau = plant.inverse_dynamics(0.0, q, v, a)
+    tau = plant.inverse_dynamics(q, v, a, t=0.0)
     return Judgement(t, (tau / limits.effort, v / limits.velocity, a / limits.acceleration))
 
 

@@ -26,7 +26,7 @@ def check_effects(plant: Plant) -> None:
             why = "comes and goes: give the arm with the payload, arm.with_(payload=…)"
         elif any(0 < t < np.inf for t in effect.switches) or (
             isinstance(effect, Force)
-            and np.diff([Plant(plant.dynamics, [effect]).torque(t, q, v) for t in _TIMES], axis=0).any()
+            and np.diff([Plant(plant.dynamics, [effect]).torque(q, v, t=t) for t in _TIMES], axis=0).any()
         ):
             why = "depends on the time"
         elif isinstance(effect, Bound) and not isinstance(effect, EffortLimit):
@@ -64,7 +64,7 @@ def why_not(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> str:
     s = _along(path)
     q, slope, _ = path.at(s)
     slowly = 1e-9 * slope  # includes friction in motion
-    load = plant.inverse_dynamics(0.0, q, slowly, 0 * q) / limits.effort
+    load = plant.inverse_dynamics(q, slowly, 0 * q, t=0.0) / limits.effort
     k, i = np.unravel_index(np.argmax(np.abs(load)), load.shape)
     name, limit = plant.dynamics.joint_names[i], float(limits.effort[i])
     needs_it = (

@@ -78,7 +78,7 @@ class Effects(NamedTuple):
 def effects_load(plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return the load h of the effects, −Σ τ_effect, (m, n), at places s with ṡ² = x, both (m,)."""
     q, slope, _ = path.at(s)
-    return -plant.torque(0.0, q, slope * np.sqrt(x)[:, None])
+    return -plant.torque(q, slope * np.sqrt(x)[:, None], t=0.0)
 
 
 def imposed(grid: np.ndarray) -> np.ndarray:

@@ -1,0 +1,35 @@
+"""Sentences built from parts and facts, so that results are stored as numbers and names and worded in one table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from string import Formatter
+
+Facts = Mapping[str, float | str]
+"""Numbers and names by name: the fields of a sentence."""
+
+Part = str | tuple[str, ...]
+"""A format string; or several of them, of which the first whose facts are all known is used."""
+
+Parts = tuple[Part, ...]
+"""The parts of a sentence."""
+
+
+def sentence(parts: Parts, facts: Facts) -> str:
+    """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
+    chosen = (next((text for text in _texts(part) if _fields(text) <= facts.keys()), "") for part in parts)
+    return "".join(text.format_map(facts) for text in chosen)
+
+
+def prefixed(prefix: str, part: Part) -> Part:
+    """Return a part of which each format string begins with a prefix."""
+    return tuple(prefix + text for text in _texts(part))
+
+
+def _texts(part: Part) -> tuple[str, ...]:
+    return (part,) if isinstance(part, str) else part
+
+
+def _fields(text: str) -> set[str]:
+    """Return the names of the facts in a format string."""
+    return {name for _, name, _, _ in Formatter().parse(text) if name}
