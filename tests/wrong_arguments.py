@@ -229,7 +229,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(measured.save, path=folder / "work.csv", theme="dark"),
         call(needs.save, path=folder / "budget.csv", theme="dark"),
         call(rd.compare_runs(several[0], several[0]).save, path=folder / "difference.csv", theme="dark"),
-        call(rd.tools.stress.stress(robot, samples=1, runs=0, budget_s=1e-3).save, path=folder / "stress.json",
+        call(rd.tools.stress.stress(robot, samples=100, runs=0, budget_s=1e-3).save, path=folder / "stress.json",
             theme="dark"),
         call(rd.tools.stress.stress, robot=robot, samples=100, runs=0, seed=3, budget_s=1e-3, on_progress=lambda
             spent, what: None),
