@@ -5,7 +5,7 @@ Other formulations  Lagrangian, compiled, euler_lagrange
 What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
-To look at          replay, show, plot, compare_runs
+To look at          replay, show, plot, diff_runs
 To keep             `.save(path)` of a run, a batch, a page, a figure or a result; read (a run, a batch)
 What comes of it    Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 

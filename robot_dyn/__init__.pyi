@@ -5,7 +5,7 @@ from robot_dyn import effects as effects
 from robot_dyn import integrate as integrate
 from robot_dyn import tools as tools
 from robot_dyn.accuracy.advice import advise as advise
-from robot_dyn.accuracy.run_difference import compare_runs as compare_runs
+from robot_dyn.accuracy.run_difference import diff_runs as diff_runs
 from robot_dyn.codegen.plant import compiled as compiled
 from robot_dyn.cross_check.compare import compare as compare
 from robot_dyn.description.catalog import list_robots as list_robots

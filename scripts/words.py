@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 0,
     "each": 142,
     "arguments": 0,
-    "Any": 807,
+    "Any": 806,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -21,7 +21,7 @@ MEASURE = {
     "advise",
     "budget",
     "certify",
-    "check",
+    "check_urdf",
     "compare",
     "cost",
     "fastest",

@@ -22,7 +22,7 @@ MOST_TEXT, MOST_HTML = 8000, 250_000  # characters
 # What makes each result, as a cell of a notebook does.
 CELLS = {
     "compare": "rd.compare(arm, samples=5)",
-    "check": "rd.tools.doctor.check('kinova')",
+    "check": "rd.tools.doctor.check_urdf('kinova')",
     "advise": "rd.advise(arm, q, duration_s=0.1, method='RK4', step_s=1e-3)",
     "prove": "rd.tools.proof.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
     "certify": "rd.accuracy.certify(arm, samples=100, repeats=1)",

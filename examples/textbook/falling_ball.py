@@ -29,16 +29,16 @@ ball = euler_lagrange(kinetic, potential, n=1)
 print(ball)  # M a + b = Q, with M = m and b = m g
 
 no_force = np.zeros(1)
-a = ball.forward_dynamics(0.0, [2.0], [3.0], no_force)
+a = ball.forward_dynamics([2.0], [3.0], no_force)
 print(f"free fall:           a = {a[0]:.4f} m/s², and a = F/m − g gives {-g:.4f}")
-hold = ball.inverse_dynamics(0.0, [2.0], [0.0], [0.0])
+hold = ball.inverse_dynamics([2.0], [0.0], [0.0])
 print(f"held in the hand:    F = {hold[0]:.4f} N, and m g = {m * g:.4f}")
 
 
 def motion(t, state):
     """State (h, v) → (v, a)."""
     h, v = state[:1], state[1:]
-    return np.concatenate([v, ball.forward_dynamics(t, h, v, no_force)])
+    return np.concatenate([v, ball.forward_dynamics(h, v, no_force)])
 
 
 h0, v0 = 2.0, 5.0  # thrown upwards

@@ -37,8 +37,8 @@ def potential(t, q):
 
 arm = euler_lagrange(kinetic, potential, n=2)
 q, v, a = np.array([0.6, -1.1]), np.array([0.9, -0.4]), np.array([1.5, 2.0])
-print("M =", arm.M(0.0, q, v), "C =", arm.C(0.0, q, v), "N =", arm.N(0.0, q), sep="\n")
-tau = arm.inverse_dynamics(0.0, q, v, a)
+print("M =", arm.M(q, v), "C =", arm.C(q, v), "N =", arm.N(q), sep="\n")
+tau = arm.inverse_dynamics(q, v, a)
 
 c2, c12, h = np.cos(q[1]), np.cos(q.sum()), -m2 * l1 * r2 * np.sin(q[1])
 M12 = m2 * (r2**2 + l1 * r2 * c2) + I2
@@ -51,10 +51,10 @@ print(f"torque for a = {a}: {tau} N m; closed form {closed_form} N m")
 
 def motion(t, x):
     """State (q, v) → (v, a), no torque."""
-    return np.concatenate([x[2:], arm.forward_dynamics(t, x[:2], x[2:], [0, 0])])
+    return np.concatenate([x[2:], arm.forward_dynamics(x[:2], x[2:], [0, 0])])
 
 
 run = solve_ivp(motion, (0, 2), [*q, *v], method="DOP853", rtol=1e-11, atol=1e-11)
-E = arm.energy(0.0, run.y[:2].T, run.y[2:].T)  # at all steps at once
+E = arm.energy(run.y[:2].T, run.y[2:].T)  # at all steps at once
 print(f"swinging freely for 2 s: energy {E[0]:.9f} J, drift {np.abs(E - E[0]).max():.1e} J")
 print(f"residual: {max(np.abs(tau - closed_form).max(), np.abs(E - E[0]).max()):.1e}")

@@ -23,7 +23,7 @@ rolling = euler_lagrange(
     n=1,
 )
 print(rolling)
-a = rolling.forward_dynamics(0.0, [0.0], [0.0], [0.0])[0]
+a = rolling.forward_dynamics([0.0], [0.0], [0.0])[0]
 print(f"Lagrange:         a = {a:.6f} m/s²;  ⅔ g sin α = {2 / 3 * g * np.sin(alpha):.6f}")
 
 # 2. Newton–Euler. x down the slope, y off it, z along the axis; the contact at (0, −r, 0) pushes and rubs.
@@ -39,7 +39,7 @@ print(f"a block sliding:  a = {g * np.sin(alpha):.6f} m/s²: a third of the work
 
 def motion(t, state):
     """State (x, v) → (v, a)."""
-    return np.array([state[1], rolling.forward_dynamics(t, state[:1], state[1:], [0.0])[0]])
+    return np.array([state[1], rolling.forward_dynamics(state[:1], state[1:], [0.0])[0]])
 
 
 run = solve_ivp(motion, (0, 1.5), [0.0, 0.3], method="DOP853", rtol=1e-12, atol=1e-12)

@@ -28,7 +28,7 @@ body = euler_lagrange(lambda t, q, v: ca.dot(omega_of(q, v), ca.DM(book.inertia)
 
 # 1. Lagrange in angles says what Euler says in body axes: compare ω̇ at one state.
 angles, rates = np.array([0.4, -0.7, 1.2]), np.array([1.0, -2.0, 0.5])
-a = body.forward_dynamics(0.0, angles, rates, np.zeros(3))
+a = body.forward_dynamics(angles, rates, np.zeros(3))
 q, v = ca.SX.sym("q", 3), ca.SX.sym("v", 3)
 omega_dot = ca.jtimes(omega_of(q, v), ca.vertcat(q, v), ca.vertcat(v, ca.DM(a)))
 by_lagrange = ca.Function("omega_dot", [q, v], [omega_dot])(angles, rates).full()[:, 0]

@@ -7,7 +7,7 @@
     Ball               an arithmetic of numbers with a radius; midpoint, radius
 
 `.save(path)` of a result writes its figure, CSV or JSON.
-Results of functions of `rd`: Comparison (compare), Advice (advise), RunDifference (compare_runs).
+Results of functions of `rd`: Comparison (compare), Advice (advise), RunDifference (diff_runs).
 robot_dyn/accuracy/README.md lists its files.
 """
 

@@ -135,7 +135,7 @@ class RunDifference(Result):
         yield ""
 
 
-def compare_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERANCE) -> RunDifference:
+def diff_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERANCE) -> RunDifference:
     """Compare two runs of one robot on the time that both have: by joint, when they part, what differs in settings.
 
     They are compared at common samples; in stretches without any, q is compared at the samples of either run as well,

@@ -28,7 +28,7 @@ app = typer.Typer(
 GROUPS = "Look at a robot or a run", "Ask for its dynamics", "Run it", "Trust it", "Files"
 """Groups of commands, in the order of --help."""
 LOOK, ASK, RUN, TRUST, FILES = GROUPS
-_TOPICS = "demo", "query", "show", "diff", "simulate", "cost", "export", "cache"
+_TOPICS = "demo", "query", "show", "diff_runs", "simulate", "cost", "export", "cache"
 
 
 def command(group: str, name: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -21,8 +21,8 @@ from robot_dyn.queries.dynamics import Dynamics
 class DryFriction(SetValued):
     """Coulomb friction: τ = −f sign(v) if v ≠ 0; if v = 0, the torque |τ| ≤ f_s that keeps the joint at rest.
 
-    A joint at rest stays exactly there for as long as the load does not exceed f_s. Then it slides, with f = f_k, or
-    by Stribeck's curve, f = f_k + (f_s − f_k) exp(−(v/v_s)²), if v_s is given. If f_s > f_k, both rest and sliding
+    A joint at rest stays exactly there for as long as the load does not exceed f_s. Then it slides, with f = f_c, or
+    by Stribeck's curve, f = f_c + (f_s − f_c) exp(−(v/v_s)²), if v_s is given. If f_s > f_c, both rest and sliding
     solve the equations for some loads: a joint at rest then stays at rest.
     [Armstrong-Hélouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the
     control of machines with friction, 1994]
@@ -31,16 +31,16 @@ class DryFriction(SetValued):
     joint at rest, which depends on the load.
 
     Attributes:
-        level: f_k, sliding friction, a scalar or (n,), in [N m] or [N], not negative.
-        static: f_s, static friction, not less than f_k; f_k by default.
+        coulomb: f_c, sliding friction, a scalar or (n,), in [N m] or [N], not negative.
+        static: f_s, static friction, not less than f_c; f_c by default.
         stribeck_velocity: v_s, a scalar or (n,), in [rad/s] or [m/s], positive; without it friction drops
-            from f_s to f_k where sliding starts.
+            from f_s to f_c where sliding starts.
 
     Example:
-        >>> rd.effects.DryFriction(level=[0.4, 0.2], static=0.6, stribeck_velocity=0.1)
+        >>> rd.effects.DryFriction(coulomb=[0.4, 0.2], static=0.6, stribeck_velocity=0.1)
     """
 
-    level: Any = field(metadata=coefficient("N m", symbol="f_k", least=0, stated="friction"))
+    coulomb: Any = field(metadata=coefficient("N m", symbol="f_c", least=0, stated="friction"))
     static: Any = field(default=None, metadata=coefficient("N m", symbol="f_s", least=0))
     stribeck_velocity: Any = field(default=None, metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
 
@@ -54,13 +54,13 @@ class DryFriction(SetValued):
         super().__post_init__()
         if self.stribeck_velocity is not None and self.static is None:
             raise EffectError("stribeck_velocity has no effect without static, the static friction; give both")
-        require("static must not be less than level", np.greater_equal, self.static, self.level)
+        require("static must not be less than coulomb", np.greater_equal, self.static, self.coulomb)
 
     @property
     def widths(self) -> tuple[Any, Any]:
         if self.static is None or self.stribeck_velocity is None:
             return inf, inf
-        return inf, np.where(np.greater(self.static, self.level), self.stribeck_velocity, inf)
+        return inf, np.where(np.greater(self.static, self.coulomb), self.stribeck_velocity, inf)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         direction = np.sign(v) if self._direction is None else self._direction
@@ -69,20 +69,20 @@ class DryFriction(SetValued):
     def sliding(self, v: Array) -> Array:
         """Return the sliding friction, f(v)."""
         if self.static is None or self.stribeck_velocity is None:
-            return self.level + 0 * v
-        return self.level + (self.static - self.level) * np.exp(-((v / self.stribeck_velocity) ** 2))
+            return self.coulomb + 0 * v
+        return self.coulomb + (self.static - self.coulomb) * np.exp(-((v / self.stribeck_velocity) ** 2))
 
     def friction(self, v: Array) -> Array:
-        return np.where(np.abs(v) > 0, self.sliding(v), self.breakaway + 0 * v)
+        return np.where(np.abs(v) > 0, self.sliding(v), self._static + 0 * v)
 
     @property
-    def breakaway(self) -> Any:
+    def _static(self) -> Any:
         """The load at which a joint starts to slide, f_s."""
-        return self.level if self.static is None else self.static
+        return self.coulomb if self.static is None else self.static
 
     def in_mode(self, mode: Mode) -> DryFriction:
         return with_values(self, {"held": mode.held, "_direction": mode.direction})
 
     def at_rest(self, q: np.ndarray) -> Interval:
-        most = np.broadcast_to(np.asarray(self.breakaway, float), q.shape).copy()
+        most = np.broadcast_to(np.asarray(self._static, float), q.shape).copy()
         return Interval(-most, most)

@@ -21,19 +21,19 @@ class ViscousFriction(Dissipative):
     """Torque proportional to joint velocity and opposed to it: τ = −b v.
 
     Attributes:
-        damping: b, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
+        viscous: b, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
 
     Example:
-        >>> rd.effects.ViscousFriction(damping=[0.3, 0.1])
+        >>> rd.effects.ViscousFriction(viscous=[0.3, 0.1])
     """
 
-    damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+    viscous: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
     term = "−b v"
     thresholds = smooth
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
-        return -self.damping * v
+        return -self.viscous * v
 
 
 @final
@@ -44,14 +44,14 @@ class RegularisedCoulombFriction(Dissipative):
     Inside |v| < v_s it creeps and does not stick; its slope f / v_s is stiff where v_s is small.
 
     Attributes:
-        friction: f, a scalar or (n,), in [N m] or [N], not negative.
+        coulomb: f, a scalar or (n,), in [N m] or [N], not negative.
         velocity_scale: v_s, a scalar or (n,), in [rad/s] or [m/s], positive.
 
     Example:
-        >>> rd.effects.RegularisedCoulombFriction(friction=0.2, velocity_scale=[0.05, 0.1])
+        >>> rd.effects.RegularisedCoulombFriction(coulomb=0.2, velocity_scale=[0.05, 0.1])
     """
 
-    friction: Any = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))
+    coulomb: Any = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))
     velocity_scale: Any = field(default=0.01, metadata=coefficient("rad/s", symbol="v_s", above=0))
 
     term = "−f tanh(v / v_s)"
@@ -59,7 +59,7 @@ class RegularisedCoulombFriction(Dissipative):
 
     @property
     def widths(self) -> tuple[Any, Any]:
-        return inf, np.where(np.asarray(self.friction) > 0, self.velocity_scale, inf)
+        return inf, np.where(np.asarray(self.coulomb) > 0, self.velocity_scale, inf)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
-        return -self.friction * tanh(v / self.velocity_scale)
+        return -self.coulomb * tanh(v / self.velocity_scale)

@@ -62,19 +62,19 @@ class LuGreFriction(Bristles, Active):
         bristle_damping: σ₁, in [N m s/rad] or [N s/m], not negative.
         viscous: σ₂, in [N m s/rad] or [N s/m], not negative.
         coulomb: f_c, sliding friction, in [N m] or [N], positive.
-        breakaway: f_s, static friction, in [N m] or [N], not less than f_c.
+        static: f_s, static friction, in [N m] or [N], not less than f_c.
         stribeck_velocity: v_s, in [rad/s] or [m/s], positive.
 
     Example:
         >>> rd.effects.LuGreFriction(bristle_stiffness=300.0, bristle_damping=1.0, viscous=0.4, coulomb=[0.7, 1.0],
-        ...     breakaway=1.2, stribeck_velocity=0.1)
+        ...     static=1.2, stribeck_velocity=0.1)
     """
 
     bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ₀", least=0))
     bristle_damping: Any = field(metadata=coefficient("N m s/rad", symbol="σ₁", least=0))
     viscous: Any = field(metadata=coefficient("N m s/rad", symbol="σ₂", least=0))
     coulomb: Any = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
-    breakaway: Any = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
+    static: Any = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
     stribeck_velocity: Any = field(metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
 
     name = "lugre_friction"
@@ -82,15 +82,15 @@ class LuGreFriction(Bristles, Active):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require("breakaway must not be less than coulomb", np.greater_equal, self.breakaway, self.coulomb)
+        require("static must not be less than coulomb", np.greater_equal, self.static, self.coulomb)
 
     @property
     def widths(self) -> tuple[Any, Any]:
-        return inf, np.where(np.greater(self.breakaway, self.coulomb), self.stribeck_velocity, inf)
+        return inf, np.where(np.greater(self.static, self.coulomb), self.stribeck_velocity, inf)
 
     def layers(self, n: int) -> tuple[Layer, ...]:
         """Return the layers of the deflection, and of the velocity: the change of v by which g changes by about f_c."""
-        falls = np.broadcast_to((self.breakaway - self.coulomb) / self.coulomb, n)
+        falls = np.broadcast_to((self.static - self.coulomb) / self.coulomb, n)
         speed, deflections = np.broadcast_to(self.stribeck_velocity, n), super().layers(n)
         joints = [layer.joint for layer in deflections if falls[layer.joint] > 0]
         widths = {i: float(speed[i] / min(falls[i], 1.0)) for i in joints}
@@ -103,7 +103,7 @@ class LuGreFriction(Bristles, Active):
         return self._rate(v, z)
 
     def _rate(self, v: Array, z: Array) -> Array:
-        level = self.coulomb + (self.breakaway - self.coulomb) * np.exp(-((v / self.stribeck_velocity) ** 2))
+        level = self.coulomb + (self.static - self.coulomb) * np.exp(-((v / self.stribeck_velocity) ** 2))
         return v - self.bristle_stiffness * np.abs(v) * z / level
 
     def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states

@@ -23,7 +23,7 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import EffectError, MissingTimeError, OverflowedError, QueryError, shown
 from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
 from robot_dyn.foundations.values import Caching, several
-from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics, NanRows
 
 
 @final
@@ -44,6 +44,8 @@ class Plant(Caching):
             raise EffectError(
                 f"dynamics: got a {type(dynamics).__name__}; pass the Plant itself, with engine='compiled'"
             )
+        if isinstance(dynamics, NanRows):
+            raise EffectError("dynamics: nan_rows is for queries only; pass the robot itself")
         if not isinstance(dynamics, Dynamics):
             raise EffectError(f"dynamics must be a robot, such as rd.load('ur5'), got {shown(dynamics)}")
         object.__setattr__(self, "dynamics", dynamics)

@@ -43,11 +43,11 @@ class SeriesElastic(GearedMotor, Dissipative):
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
         ratio: n of the gear; 1 by default.
         damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 by default.
-        friction: b of the motor at the output of the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        viscous: b of the motor at the output of the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
         backlash: β, to each side, in [rad] or [m], not negative; 0 by default.
 
     Example:
-        >>> rd.effects.SeriesElastic(stiffness=[0.0, 80.0], inertia=0.02, ratio=5.0, damping=0.1, friction=0.2,
+        >>> rd.effects.SeriesElastic(stiffness=[0.0, 80.0], inertia=0.02, ratio=5.0, damping=0.1, viscous=0.2,
         ...     backlash=0.01)
     """
 
@@ -55,7 +55,7 @@ class SeriesElastic(GearedMotor, Dissipative):
     inertia: Any = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
     ratio: Any = field(default=None, metadata=coefficient(symbol="n", above=0, elsewhere=1.0))
     damping: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="d", least=0))
-    friction: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
+    viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
     backlash: Any = field(default=None, metadata=coefficient("rad", symbol="β", least=0))
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
@@ -97,8 +97,8 @@ class SeriesElastic(GearedMotor, Dissipative):
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
         n, speed = dynamics.n, self.speeds(z)
         load = self._torque(n, v, z)
-        if self.friction is not None:
-            load = load + self.of("friction", n) * speed
+        if self.viscous is not None:
+            load = load + self.of("viscous", n) * speed
         return np.concatenate([speed - v[self._driven], (u[self._driven] - load) / self.reflected(n)])
 
     def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states

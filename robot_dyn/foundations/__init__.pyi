@@ -30,6 +30,7 @@ from robot_dyn.foundations.errors import EditError as EditError
 from robot_dyn.foundations.errors import EffectError as EffectError
 from robot_dyn.foundations.errors import MachineCodeError as MachineCodeError
 from robot_dyn.foundations.errors import MissingExtraError as MissingExtraError
+from robot_dyn.foundations.errors import MissingTimeError as MissingTimeError
 from robot_dyn.foundations.errors import NotFiniteError as NotFiniteError
 from robot_dyn.foundations.errors import OverflowedError as OverflowedError
 from robot_dyn.foundations.errors import PlanError as PlanError

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.arithmetic import apply
-from robot_dyn.foundations.errors import OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.foundations.errors import MissingTimeError, OverflowedError, QueryError, RobotDynError, SingularError
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.foundations.validate import integer, rows
 
@@ -30,24 +30,27 @@ Potential = Callable[[Any, Any], Any]
 class EulerLagrange:
     """The equation of motion M(t, q, v) a + b(t, q, v) = Q of a system of n coordinates; built by `euler_lagrange`.
 
-    All methods accept t (...) in [s], and q, v, a, Q (..., n) in the units of the coordinates. They raise QueryError
-    for a wrong shape or a non-finite value, and OverflowedError where the energies are not finite.
+    All methods accept q, v, a, Q (..., n) in the units of the coordinates, and times t (...) in [s], which are required
+    if the result depends on the time. They raise QueryError for a wrong shape or a non-finite value, MissingTimeError
+    for a missing t, and OverflowedError where the energies are not finite.
 
     Attributes:
         n: Number of coordinates.
         kernels: CasADi functions of (t, q, v) by name.
+        timed: Names of the kernels that depend on t.
         no_coriolis: Reason why C is undefined, or "" if it is defined.
     """
 
     n: int
     kernels: Mapping[str, Any]
+    timed: frozenset[str]
     no_coriolis: str
 
-    def M(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def M(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return the mass matrix ∂²K/∂v², symmetric, shape (..., n, n); it depends on v unless K is quadratic in v."""
         return self._evaluate("M", t, q, v, shape=(self.n, self.n))
 
-    def C(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def C(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return the Coriolis matrix of the Christoffel symbols, shape (..., n, n): Ṁ = C + Cᵀ and M a + C v + N = Q.
 
         C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k
@@ -58,36 +61,34 @@ class EulerLagrange:
         Source: Murray, Li, Sastry 1994, eq. 4.23.
         """
         if self.no_coriolis:
-            raise RobotDynError(
-                f"no Coriolis matrix: {self.no_coriolis}; use bias(t, q, v), which is defined for every K"
-            )
+            raise RobotDynError(f"no Coriolis matrix: {self.no_coriolis}; use bias(q, v), which is defined for every K")
         return self._evaluate("C", t, q, v, shape=(self.n, self.n))
 
-    def N(self, t: ArrayLike, q: ArrayLike) -> np.ndarray:
+    def N(self, q: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return the gradient of the potential ∂V/∂q, shape (..., n)."""
         return self._evaluate("N", t, q, shape=(self.n,))
 
-    def bias(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def bias(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return Q for a = 0: b = (∂²K/∂v∂q) v + ∂²K/∂v∂t − ∂K/∂q + ∂V/∂q, shape (..., n)."""
         return self._evaluate("bias", t, q, v, shape=(self.n,))
 
-    def momentum(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def momentum(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return the generalised momentum p = ∂K/∂v, shape (..., n); ṗ = ∂L/∂q + Q."""
         return self._evaluate("momentum", t, q, v, shape=(self.n,))
 
-    def kinetic_energy(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return K in [J], shape (...)."""
         return self._evaluate("K", t, q, v, shape=())
 
-    def potential_energy(self, t: ArrayLike, q: ArrayLike) -> np.ndarray:
+    def potential_energy(self, q: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return V in [J], shape (...)."""
         return self._evaluate("V", t, q, shape=())
 
-    def energy(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def energy(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return K + V in [J], shape (...); not constant if a moving constraint does work."""
-        return self.kinetic_energy(t, q, v) + self.potential_energy(t, q)
+        return self.kinetic_energy(q, v, t=t) + self.potential_energy(q, t=t)
 
-    def jacobi_integral(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def jacobi_integral(self, q: ArrayLike, v: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return Jacobi's integral h = vᵀ p − L in [J], shape (...).
 
         It is constant if Q = 0 and ∂L/∂t = 0, and equals K + V if K = ½ vᵀ M v.
@@ -96,21 +97,21 @@ class EulerLagrange:
         """
         return self._evaluate("jacobi", t, q, v, shape=())
 
-    def inverse_dynamics(self, t: ArrayLike, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> np.ndarray:
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return the generalised force Q = M a + b, shape (..., n)."""
         a = rows("a", a, self.n)
-        M, b = self.M(t, q, v), self.bias(t, q, v)
+        M, b = self.M(q, v, t=t), self.bias(q, v, t=t)
         _batches("a", a.shape[:-1], b.shape[:-1])
         return _finite(apply(M, a) + b)
 
-    def forward_dynamics(self, t: ArrayLike, q: ArrayLike, v: ArrayLike, Q: ArrayLike) -> np.ndarray:
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, Q: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
         """Return the acceleration a = M⁻¹ (Q − b), shape (..., n).
 
         Raises:
             SingularError: If M is not positive definite at this state, for example Euler angles in gimbal lock.
         """
         Q = rows("Q", Q, self.n)
-        M, b = self.M(t, q, v), self.bias(t, q, v)
+        M, b = self.M(q, v, t=t), self.bias(q, v, t=t)
         batch = _batches("Q", Q.shape[:-1], b.shape[:-1])
         try:
             a = cholesky_solve(np.broadcast_to(M, (*batch, self.n, self.n)), np.broadcast_to(Q - b, (*batch, self.n)))
@@ -125,7 +126,9 @@ class EulerLagrange:
         return f"M a + b = Q\nM = {M}\nb = {b}"
 
     def _evaluate(self, name: str, t: Any, q: Any, v: Any = None, *, shape: tuple[int, ...]) -> np.ndarray:
-        t, q = rows("t", t), rows("q", q, self.n)
+        if t is None and name in self.timed:
+            raise MissingTimeError("the energies depend on the time: pass t=, in [s]")
+        t, q = rows("t", 0.0 if t is None else t), rows("q", q, self.n)
         v = np.zeros(self.n) if v is None else rows("v", v, self.n)
         batch = _batches("v", v.shape[:-1], _batches("t", t.shape, q.shape[:-1]))
         size = int(np.prod(batch))
@@ -169,7 +172,8 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
     if not no_coriolis:
         results["C"] = _christoffel(M, q, v).T  # CasADi stores columns first, NumPy rows
     kernels = {name: ca.Function(name, [t, q, v], [ca.densify(ca.vec(x))]) for name, x in results.items()}
-    return EulerLagrange(n, kernels, no_coriolis)
+    timed = frozenset(name for name, x in results.items() if ca.depends_on(ca.densify(ca.vec(x)), t))
+    return EulerLagrange(n, kernels, timed, no_coriolis)
 
 
 def traced(name: str, function: Callable[..., Any], symbols: tuple[Any, ...], shape: tuple[int, int] = (1, 1)) -> Any:

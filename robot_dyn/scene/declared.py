@@ -137,6 +137,6 @@ def _keys_of(
 
 
 def _key(name: str, unit: str) -> str:
-    """Return a name with its unit, such as "damping_N_m_s_per_rad"."""
+    """Return a name with its unit, such as "viscous_N_m_s_per_rad"."""
     spelled = "".join(_SPELLED.get(letter, letter) for letter in unit)
     return f"{name}_{spelled}" if spelled else name

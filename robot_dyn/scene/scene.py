@@ -205,7 +205,7 @@ def read_scene(path: str | Path, *, effects: Factories | None = None) -> Setup:
     Args:
         path: Path of the file.
         effects: User-defined effects for the scene: a class, or a function that returns an effect, by kind. The keys
-            of its table are the arguments, declared coefficients with their unit, such as "damping_N_m_s_per_rad";
+            of its table are the arguments, declared coefficients with their unit, such as "viscous_N_m_s_per_rad";
             values are numbers, arrays from lists, or arrays (n,) from tables by joint.
 
     Raises:

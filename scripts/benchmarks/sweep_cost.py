@@ -64,7 +64,7 @@ kind = "gravity"
 
 [[effect]]
 kind = "viscous_friction"
-damping_N_m_s_per_rad = 0.5
+viscous_N_m_s_per_rad = 0.5
 """
 
 
@@ -72,7 +72,7 @@ def planar(folder: str, runs: int) -> sw.Sweep:
     """200 steps of two bars, with friction, starts and masses that vary."""
     (Path(folder) / "scene.toml").write_text(SCENE.format(duration_s=0.2))
     vary = {
-        "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.2),
+        "viscous_friction.viscous": sw.lognormal(median=0.5, sigma_of_log=0.2),
         "q0": sw.normal(mean=[0.4, 0.9], sd=0.05),
         "mass_scale": sw.normal(mean=1.0, sd=0.1),
     }
@@ -87,7 +87,7 @@ def panda(folder: str, runs: int) -> sw.Sweep:
     lines[at + 1 : at + 1] = ['method = "RK4"', "step_s = 0.001"]
     (Path(folder) / "scene.toml").write_text("\n".join(lines))
     vary = {
-        "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.2),
+        "viscous_friction.viscous": sw.lognormal(median=0.5, sigma_of_log=0.2),
         "mass_scale": sw.normal(mean=1, sd=0.1),
     }
     return sw.Sweep(f"{folder}/scene.toml", runs, vary, {"error": sw.rms_tracking_error(), "peak": sw.peak("u")})

@@ -217,7 +217,9 @@ def run_values(run: Any) -> tuple[Values, Texts]:
     values |= {f"torque of {name}": x for name, x in sorted((run.effect_torques or {}).items())}
     optional = {
         "reference": run.desired,
-        "deviation": None if run.tracking_error is None else -run.tracking_error,  # the name and sign in stored results
+        "deviation": None
+        if run.tracking_error is None
+        else 0.0 - run.tracking_error,  # name and sign of stored results
         "state of the controller": run.controller_states,
         "extremes": run.extremes,
     }
@@ -271,8 +273,8 @@ def rollouts_values(runs: Any) -> tuple[Values, Texts]:
 
 
 PARAMETERS = {  # names of parameters that vary, where they differ from those used here
-    "viscous": "viscous_friction.damping",
-    "dry": "dry_friction.level",
+    "viscous": "viscous_friction.viscous",
+    "dry": "dry_friction.coulomb",
     "dry static": "dry_friction.static",
     "limit": "effort_limit.limit",
     "lugre stiffness": "lugre_friction.bristle_stiffness",
@@ -284,7 +286,7 @@ PARAMETERS = {  # names of parameters that vary, where they differ from those us
     "restitution": "rigid_stops.restitution",
     "spring": "spring.stiffness",
     "elastic stiffness": "series_elastic.stiffness",
-    "regularised": "regularised_coulomb_friction.friction",
+    "regularised": "regularised_coulomb_friction.coulomb",
 }
 
 

@@ -219,11 +219,11 @@ def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
     text = (
         'robot = "planar_2r"\nduration_s = 0.05\nmethod = "RK4"\nstep_s = {}\n[[effect]]\nkind = "viscous_friction"\n'
     )
-    scene.write_text(text.format("1e-2") + "damping_N_m_s_per_rad = 60.0\n")
+    scene.write_text(text.format("1e-2") + "viscous_N_m_s_per_rad = 60.0\n")
     result = run("advise", scene)
     assert (result.returncode, result.stderr) == (1, "")
     assert "unstable; RK4 is stable up to" in result.stdout
-    scene.write_text(text.format("1e-4") + "damping_N_m_s_per_rad = 60.0\n")
+    scene.write_text(text.format("1e-4") + "viscous_N_m_s_per_rad = 60.0\n")
     result = run("advise", scene, "--json")
     made = json.loads(result.stdout)
     assert result.returncode == 0

@@ -47,7 +47,7 @@ def over_time(t: np.ndarray, x: np.ndarray) -> float:
 def test_two_payloads_differ_by_the_closed_form() -> None:
     """Runs are accurate to rtol 1e-10, and differences are some 0.1: nine digits of them."""
     a, b = loaded(1.0), loaded(2.5)
-    found = rd.compare_runs(coasting(a), coasting(b))
+    found = rd.diff_runs(coasting(a), coasting(b))
     t = np.linspace(0.0, DURATION, 51)
     for each, x, y in zip(found.joints[:2], motion(a, t), motion(b, t), strict=True):
         assert each.rms == pytest.approx(over_time(t, y - x), rel=1e-8)
@@ -62,7 +62,7 @@ def test_two_payloads_differ_by_the_closed_form() -> None:
 
 def test_a_run_does_not_differ_from_itself() -> None:
     run = coasting(loaded(1.0))
-    found = rd.compare_runs(run, coasting(loaded(1.0)))
+    found = rd.diff_runs(run, coasting(loaded(1.0)))
     assert all(each.rms == each.largest == 0 for each in found.joints)
     assert found.parted is None and found.settings == () and found.left_out == ()
     assert "are equal at all 51 times" in found.sentence and "no setting differs" in repr(found)
@@ -73,7 +73,7 @@ def test_a_known_shift_is_found_with_its_time() -> None:
     arm, shift = rd.load("planar_2r"), 1e-3
     run = rd.simulate(arm, q0=[0.4, -0.7], duration_s=0.5, record_every_s=0.01)
     bump = np.where(run.t >= 0.3 - 1e-9, shift, 0.0) * np.where(np.isclose(run.t, 0.4), 2.0, 1.0)
-    found = rd.compare_runs(run, replace(run, q=run.q + np.outer(bump, [0, 1])))
+    found = rd.diff_runs(run, replace(run, q=run.q + np.outer(bump, [0, 1])))
     first, _, _, second, *_ = found.joints
     assert (first.rms, first.largest) == (0.0, 0.0)
     assert second.largest == pytest.approx(2 * shift) and second.at == pytest.approx(0.4)
@@ -85,23 +85,23 @@ def test_one_motion_by_two_methods_does_not_part_within_their_errors() -> None:
     """RK4 with a long step differs from DOP853 by more than the tolerance, and by no more than it says."""
     a = coasting(loaded(1.0))
     b = coasting(loaded(1.0), method="RK4", step_s=0.05, record_every_s=0.05)
-    found = rd.compare_runs(a, b)
+    found = rd.diff_runs(a, b)
     assert b.error is not None and found.parted is None and 0 < found.joints[0].largest < 4 * b.error.largest
     assert {each.name for each in found.settings} == {"method", "rtol", "atol", "step"}
-    blind = rd.compare_runs(replace(a, error=None), b, tolerance=found.joints[0].largest / 2)
+    blind = rd.diff_runs(replace(a, error=None), b, tolerance=found.joints[0].largest / 2)
     assert blind.parted is not None and any("no estimate" in each for each in blind.left_out)
-    assert rd.compare_runs(replace(a, error=None), b, tolerance=found.joints[0].largest * 2).parted is None
+    assert rd.diff_runs(replace(a, error=None), b, tolerance=found.joints[0].largest * 2).parted is None
 
 
 def test_samples_at_other_times_are_interpolated_without_parting() -> None:
     """What a quintic leaves between samples 0.013 s apart is allowed for, and is a part of what they part beyond."""
     a, b = coasting(loaded(1.0)), coasting(loaded(1.0), record_every_s=0.013)
-    found = rd.compare_runs(a, b)
+    found = rd.diff_runs(a, b)
     assert a.error is not None and b.error is not None
     assert found.common < found.samples and found.fraction > 0.9 and found.parted is None
     assert 0 < found.interpolation <= a.error.largest + b.error.largest
     assert found.joints[0].largest <= 2 * (a.error.largest + b.error.largest) + found.interpolation
-    parts = rd.compare_runs(a, coasting(loaded(1.001), record_every_s=0.013))
+    parts = rd.diff_runs(a, coasting(loaded(1.001), record_every_s=0.013))
     t = np.linspace(0, DURATION, 5001)
     gap = abs(motion(loaded(1.0), t)[0] - motion(loaded(1.001), t)[0]).max()
     assert parts.parted is not None and parts.joints[0].largest == pytest.approx(gap, rel=1e-4)
@@ -117,7 +117,7 @@ def bouncing(period: float, **given: Any) -> rd.Trajectory:
 @pytest.mark.parametrize(("first", "second"), [(0.05, 0.03), (0.01, 0.013), (0.005, 0.007)])
 def test_one_motion_across_impacts_does_not_part(first: float, second: float) -> None:
     """Polynomials across an impact err by 0.02 rad; at common samples both are the same to 1e-15."""
-    found = rd.compare_runs(bouncing(first), bouncing(second))
+    found = rd.diff_runs(bouncing(first), bouncing(second))
     assert found.parted is None and found.common > 1
     errors = [run.error.largest for run in found.runs if run.error is not None]
     assert all(each.largest <= 2 * sum(errors) + found.interpolation for each in found.joints if each.quantity == "q")
@@ -126,7 +126,7 @@ def test_one_motion_across_impacts_does_not_part(first: float, second: float) ->
 
 def test_runs_with_few_times_in_common_are_not_said_to_be_the_same_motion() -> None:
     """Every 0.05 and 0.03 s, with an impact in most intervals: 8 common samples, between which both have others."""
-    found = rd.compare_runs(bouncing(0.05), bouncing(0.03))
+    found = rd.diff_runs(bouncing(0.05), bouncing(0.03))
     assert found.parted is None and not found.is_conclusive and found.fraction < 0.5
     assert "record both at the same times" in found.sentence and "do not part" not in found.sentence
     page = rd.replay(bouncing(0.05), bouncing(0.03)).document
@@ -136,15 +136,15 @@ def test_runs_with_few_times_in_common_are_not_said_to_be_the_same_motion() -> N
 
 def test_the_times_of_the_coarser_run_are_all_the_time_if_both_have_them() -> None:
     """A run every 0.05 s has nothing between two of its samples that a run every 0.01 s could be compared with."""
-    found = rd.compare_runs(bouncing(0.05), bouncing(0.01))
+    found = rd.diff_runs(bouncing(0.05), bouncing(0.01))
     assert (found.samples, found.common, found.fraction) == (21, 21, 1.0)
 
 
 def test_runs_without_any_time_to_compare_have_no_numbers() -> None:
     run = bouncing(0.05)
-    found = rd.compare_runs(run, replace(run, t=run.t + 0.02))
+    found = rd.diff_runs(run, replace(run, t=run.t + 0.02))
     assert found.fraction < 0.5 and not found.is_conclusive
-    none = rd.compare_runs(replace(run, a=np.full_like(run.a, np.nan)), replace(run, t=run.t + 0.02, a=run.a * np.nan))
+    none = rd.diff_runs(replace(run, a=np.full_like(run.a, np.nan)), replace(run, t=run.t + 0.02, a=run.a * np.nan))
     assert none.samples == 0 and none.parted is None and np.isnan(none.joints[0].largest) and none.fraction == 0
     assert (none.start, none.end) == (0.02, 1.0)
     assert rd.replay(run, replace(run, t=run.t + 0.02, a=run.a * np.nan)).document["plots"]
@@ -172,7 +172,7 @@ def test_an_event_that_no_run_names_does_not_part_one_motion(order: int) -> None
         periods, kink = rng.uniform(0.01, 0.1, 2), rng.uniform(0, 1)
         size = 10 ** rng.uniform(-8, 1)
         made = [recorded(h, kink, size) for h in periods]
-        found = rd.compare_runs(*made, tolerance=10 ** rng.uniform(-8, -2))
+        found = rd.diff_runs(*made, tolerance=10 ** rng.uniform(-8, -2))
         assert found.parted is None, (periods, kink, size)
         interpolated += found.common < found.samples
     assert interpolated > 40
@@ -188,7 +188,7 @@ def test_pairs_of_one_motion_do_not_part_and_pairs_that_differ_by_ten_times_thei
 
 def test_the_common_part_of_runs_of_different_length_is_compared_and_said() -> None:
     a, b = coasting(loaded(1.0)), coasting(loaded(1.0), duration_s=0.8)
-    found = rd.compare_runs(a, b)
+    found = rd.diff_runs(a, b)
     assert found.end == DURATION and found.parted is None
     assert found.left_out == ("0.5 to 0.8 s, which only run 2 has",)
 
@@ -208,9 +208,9 @@ def test_each_setting_that_differs_is_named_and_no_other(changes: str) -> None:
         start = q + (0.01 if is_it("start") else 0.0)
         return rd.simulate(plant, q0=start, duration_s=0.1, controller=law, estimate_error=False)
 
-    found = {each.name: (each.a, each.b) for each in rd.compare_runs(run(""), run(changes)).settings}
+    found = {each.name: (each.a, each.b) for each in rd.diff_runs(run(""), run(changes)).settings}
     expected = {
-        "damping": {"viscous_friction.damping": ("0.1 N m s/rad", "0.1000000001 N m s/rad")},
+        "damping": {"viscous_friction.viscous": ("0.1 N m s/rad", "0.1000000001 N m s/rad")},
         "gain": {"control.kp": ("100 1/s²", "101 1/s²")},
         "period": {"control": tuple(f"ComputedTorque, every {x} s, constant between" for x in ("0.001", "0.002"))},
         "model": {"control.model.mass_scale": ("1", "1.1")},
@@ -227,25 +227,25 @@ def test_runs_that_have_nothing_in_common_are_refused() -> None:
     other = rd.simulate(rd.load("planar_2r"), q0=[0.1, 0.2], duration_s=0.1)
     for a, b in ((run, other), (other, run)):
         with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; give two of one robot"):
-            rd.compare_runs(a, b)
+            rd.diff_runs(a, b)
     named = replace(run, about=run.about | {"robot": "another"})
     with pytest.raises(QueryError, match="different robots, pendulum and another"):
-        rd.compare_runs(run, named)
+        rd.diff_runs(run, named)
     with pytest.raises(QueryError, match=r"no time in common: 0 to 0\.5 s and 1 to 1\.5 s"):
-        rd.compare_runs(run, replace(run, t=run.t + 1))
+        rd.diff_runs(run, replace(run, t=run.t + 1))
     with pytest.raises(QueryError, match="tolerance"):
-        rd.compare_runs(run, run, tolerance=0.0)
+        rd.diff_runs(run, run, tolerance=0.0)
 
 
 def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Path) -> None:
     for name, mass in (("light", 1.0), ("heavy", 2.0)):
         coasting(loaded(mass)).save(tmp_path / name)
     light, heavy = (rd.read(tmp_path / f"{name}.npz") for name in ("light", "heavy"))
-    found = rd.compare_runs(light, heavy)
+    found = rd.diff_runs(light, heavy)
     assert found.names == ("light", "heavy") and [each.name for each in found.settings] == ["payload on rod"]
     old = replace(light, about={name: text for name, text in light.about.items() if name != "settings"})
-    assert "edits" in {each.name for each in rd.compare_runs(old, heavy).settings}
-    assert any("contains no settings" in each for each in rd.compare_runs(old, heavy).left_out)
+    assert "edits" in {each.name for each in rd.diff_runs(old, heavy).settings}
+    assert any("contains no settings" in each for each in rd.diff_runs(old, heavy).left_out)
 
 
 def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:
@@ -253,11 +253,11 @@ def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:
     for name, mass in (("a", 1.0), ("b", 2.0)):
         coasting(loaded(mass)).save(tmp_path / name)
     paths = (tmp_path / "a.npz", tmp_path / "b.npz")
-    keys, found = promised("diff"), document("diff", *paths)
+    keys, found = promised("diff-runs"), document("diff-runs", *paths)
     assert found.keys() == keys.keys()
     assert found["joints"][0].keys() == names(keys["joints"].partition(": ")[2])
     assert found["settings"][0].keys() == names(keys["settings"].partition(": ")[2])
-    assert ran("diff", *paths, "-o", tmp_path / "d.svg", "--csv", tmp_path / "d.csv").returncode == 0
+    assert ran("diff-runs", *paths, "-o", tmp_path / "d.svg", "--csv", tmp_path / "d.csv").returncode == 0
     assert (tmp_path / "d.svg").read_bytes().startswith(b"<?xml")
     assert (tmp_path / "d.csv").read_text(encoding="utf-8").startswith("joint,quantity,unit,rms,largest,at\n")
 
@@ -272,11 +272,11 @@ def test_runs_are_named_by_both_settings_in_which_they_differ() -> None:
         return rd.simulate(plant, q0=q, duration_s=0.05, controller=law, estimate_error=False)
 
     a = run(100.0, 20.0)
-    one = rd.compare_runs(a, run(400.0, 20.0)).names
+    one = rd.diff_runs(a, run(400.0, 20.0)).names
     assert one == ("control.kp 100 N m/rad", "control.kp 400 N m/rad")
-    two = rd.compare_runs(a, run(400.0, 40.0)).names
+    two = rd.diff_runs(a, run(400.0, 40.0)).names
     assert two == ("kp 100, kd 20", "kp 400, kd 40")
-    assert all(each.endswith(", …") for each in rd.compare_runs(a, run(400.0, 40.0, 0.2)).names)
+    assert all(each.endswith(", …") for each in rd.diff_runs(a, run(400.0, 40.0, 0.2)).names)
     title = rd.replay(a, run(400.0, 20.0)).document["title"]
     assert title == f"planar_2r: {one[0]} / {one[1]} (transparent, dashed)"
 
@@ -289,7 +289,7 @@ def test_titles_of_many_joints_with_long_names_do_not_overlap() -> None:
     arm = rd.Robot.from_text(chain(*[body()] * 12, names=names))
     a, b = (rd.simulate(arm, q0=np.full(12, q), duration_s=0.02, estimate_error=False) for q in (0.0, 0.1))
     for theme in ("light", "page"):
-        figure = draw(rd.compare_runs(a, b), theme)
+        figure = draw(rd.diff_runs(a, b), theme)
         figure.draw_without_rendering()
         parts: list[Any] = [text for axes in figure.axes for text in axes.get_children() if isinstance(text, Text)]
         titles = [text for text in parts if "joint_" in text.get_text()]

@@ -117,7 +117,7 @@ def _estimated(run: rd.Trajectory) -> bool:
 
 
 def _compared(scene: Scene, a: rd.Trajectory, b: rd.Trajectory, both: tuple[float, float], apart: float) -> Pair:
-    found = rd.compare_runs(a, b)
+    found = rd.diff_runs(a, b)
     difference = found.difference
     assert difference is not None
     off = float((np.abs(difference.q).max(axis=1) / difference.bound).max(initial=0.0))

@@ -160,7 +160,7 @@ q = [0.3, 0.4]
 kind = "gravity"
 [[effect]]
 kind = "dry_friction"
-level_N_m = 3.0
+coulomb_N_m = 3.0
 static_N_m = {joint_1 = 4.0, joint_2 = 20.0}
 [[effect]]
 kind = "rigid_stops"

@@ -13,12 +13,12 @@ from tests.command import document, interrupted_at_work, refusal, run
 from tests.long import long
 
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n{}\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n'
-DRAG = '[[effect]]\nkind = "viscous_friction"\ndamping_N_m_s_per_rad = 0.3\n'
-SCENES = {"accuracy": SCENE.format('engine = "interpreted"'), "cost": SCENE.format("accuracy = 1e-6") + DRAG}
+DRAG = '[[effect]]\nkind = "viscous_friction"\nviscous_N_m_s_per_rad = 0.3\n'
+SCENES = {"work-precision": SCENE.format('engine = "interpreted"'), "cost": SCENE.format("accuracy = 1e-6") + DRAG}
 METHODS = ("--method", "RK4", "--method", "Euler")
-FEW = {"accuracy": (*METHODS, "--repeats", "1", "--no-peers"), "cost": ("--budget", "0.2", "--repeats", "2")}
+FEW = {"work-precision": (*METHODS, "--repeats", "1", "--no-peers"), "cost": ("--budget", "0.2", "--repeats", "2")}
 FEW["certify"] = ("--samples", "100", "--repeats", "1")
-TABLES = {"accuracy": "method,engine", "cost": "group,what", "certify": "quantity,implementation,given,typical"}
+TABLES = {"work-precision": "method,engine", "cost": "group,what", "certify": "quantity,implementation,given,typical"}
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def scene(tmp_path: Path, command: str) -> Path:
 
 
 SENTENCES = {
-    "accuracy": (
+    "work-precision": (
         r"\d+ digits of q over 0\.1 s: RK4", r"Euler \(interpreted\)", "planar_2r: gravity 9.807 m/s²",
     ),
     "cost": (
@@ -59,8 +59,8 @@ def test_it_says_a_sentence_and_writes_a_figure_and_a_table(command: str, scene:
 @pytest.mark.parametrize("command", SCENES)
 def test_document_has_the_keys_that_are_promised(command: str, scene: Path) -> None:
     written = document(command, scene, *FEW[command])
-    row = written["rows" if command == "accuracy" else "alternatives"][0]
-    parts = (written["reference"], written["ladders"][0]) if command == "accuracy" else (row["first"],)
+    row = written["rows" if command == "work-precision" else "alternatives"][0]
+    parts = (written["reference"], written["ladders"][0]) if command == "work-precision" else (row["first"],)
     assert promised(command).keys() == {*written, *row, *(key for part in parts for key in part)}
 
 
@@ -77,14 +77,21 @@ def test_document_of_certify_has_the_keys_that_are_promised_and_no_infinity() ->
 
 def test_a_robot_swings_freely_from_the_start_that_is_given() -> None:
     written = document(
-        "accuracy", "pendulum", "--q", "0.5", "--duration", "0.2", *FEW["accuracy"][:2], *FEW["accuracy"][4:]
+        "work-precision",
+        "pendulum",
+        "--q",
+        "0.5",
+        "--duration",
+        "0.2",
+        *FEW["work-precision"][:2],
+        *FEW["work-precision"][4:],
     )
     assert (written["robot"], written["reference"]["horizon_s"], written["unit"]) == ("pendulum", 0.2, "rad")
     assert {each["engine"] for each in written["ladders"]} == {"compiled", "interpreted"}
 
 
 WATCHED = {  # where each is at work: behind the first ladder, and before what is timed
-    "accuracy": """
+    "work-precision": """
 from robot_dyn.accuracy.work_precision_diagram import measurement as study
 work = study._walk
 study._walk = lambda *given: (work(*given), tell())[0]
@@ -97,13 +104,13 @@ study.take_turns = lambda *given: (tell(), work(*given))[1]
 }
 
 
-@pytest.mark.parametrize("command", ["accuracy", *long(["cost"])])
+@pytest.mark.parametrize("command", ["work-precision", *long(["cost"])])
 def test_ctrl_c_ends_the_measurement_and_keeps_what_was_measured(command: str, scene: Path) -> None:
     repeats = ("--repeats", "1000") if command == "cost" else ()
     out = interrupted_at_work(command, scene, "--budget", "3000", *repeats, "--json", watched=WATCHED[command])
     written = json.loads(out)
     assert written["interrupted"] and "interruption" in written["left_out"][-1]
-    assert written["ladders" if command == "accuracy" else "alternatives"]
+    assert written["ladders" if command == "work-precision" else "alternatives"]
 
 
 PROVEN = (
@@ -136,5 +143,5 @@ def test_what_is_not_proven_is_told_by_the_exit_code(proven: Path) -> None:
     done = run("prove", proven, "--until", "100", "--budget", "0.2")
     assert done.returncode == 1
     assert re.search(r"Not proven beyond t = 0\.\d+ s, because the budget of 0\.2 s is used up\.", done.stdout)
-    proven.write_text(PROVEN + '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0\n', encoding="utf-8")
+    proven.write_text(PROVEN + '[[effect]]\nkind = "dry_friction"\ncoulomb_N_m = 1.0\n', encoding="utf-8")
     assert "effect dry_friction switches" in refusal(["prove", str(proven)])

@@ -18,7 +18,7 @@ from tests.scene.test_scene_loading import MJCF, URDF
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 TAKING = {
     "robot_dyn.cli.commands.query": ("info", "query", "compare"), "robot_dyn.cli.commands.show": ("show_",),
-    "robot_dyn.cli.commands.cost": ("accuracy", "certify"), "robot_dyn.tools.motors.command": ("budget",),
+    "robot_dyn.cli.commands.cost": ("work_precision", "certify"), "robot_dyn.tools.motors.command": ("budget",),
     "robot_dyn.tools.stress.command": ("stress",),
 }  # fmt: skip
 

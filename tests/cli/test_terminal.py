@@ -41,7 +41,7 @@ def assert_harmless(text: str) -> None:
         ("info", "{urdf}.gone"),
         ("query", "{urdf}"),
         ("compare", "{urdf}"),
-        ("check", "{urdf}", "{urdf}.gone", "--fix", "--force"),
+        ("check-urdf", "{urdf}", "{urdf}.gone", "--fix", "--force"),
         ("show", "{urdf}", "--html", "{urdf}.html"),
         ("simulate", "{toml}", "-o", "{urdf}.npz", "--csv", "{urdf}.csv", "--force"),
         ("simulate", "{urdf}.toml.gone"),
@@ -122,7 +122,7 @@ def test_a_run_shows_the_time_left_in_a_terminal(scene: Path) -> None:
 
 
 def test_no_bar_says_that_it_simulates_where_nothing_is_simulated() -> None:
-    for command in ("check", "compare"):
+    for command in ("check-urdf", "compare"):
         code, seen = watched(command, "pendulum")
         assert code == 0 and "pendulum" in seen and "simulating" not in seen
 

@@ -60,7 +60,7 @@ def test_another_engine_has_the_same_equations(program: str, engine: Callable[[r
     robot = loaded(name)
     if not robot.couplings.trivial:
         pytest.skip("has joints that follow others, which other engines keep as constraints")
-    found = {each.kind for each in rd.tools.doctor.check(name).findings}
+    found = {each.kind for each in rd.tools.doctor.check_urdf(name).findings}
     try:
         other = engine(robot)
     except PeerError as error:

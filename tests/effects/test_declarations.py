@@ -569,7 +569,7 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
     with pytest.raises(EffectError, match="wide does not fit 2 joints"):
         rd.Plant(ARM, [Wide()]).torque(Q, V, t=0.0)
     broken, plant = rd.effects.ViscousFriction(0.1), rd.Plant(ARM)
-    object.__setattr__(broken, "damping", np.ones(3))
+    object.__setattr__(broken, "viscous", np.ones(3))
     object.__setattr__(plant, "effects", (broken,))
     with pytest.raises(EffectError, match="viscous_friction does not fit"):
         plant.torque(Q, V, t=0.0)

@@ -231,7 +231,7 @@ def only(effect):
 
 def test_what_is_not_named_is_free() -> None:
     """No friction, no spring, no stop and no limit at a joint that is not named."""
-    np.testing.assert_array_equal(only(rd.effects.ViscousFriction({"hinge": 0.3})).damping, [0.0, 0.3])
+    np.testing.assert_array_equal(only(rd.effects.ViscousFriction({"hinge": 0.3})).viscous, [0.0, 0.3])
     spring = only(rd.effects.Spring({"slide": 2.0}, rest={"slide": 0.1}))
     np.testing.assert_array_equal([spring.stiffness, spring.rest], [[2.0, 0.0], [0.1, 0.0]])
     np.testing.assert_array_equal(only(rd.effects.EffortLimit({"slide": 3.0})).limit, [3.0, np.inf])
@@ -242,10 +242,10 @@ def test_what_is_not_named_is_free() -> None:
 
 def test_urdf_is_what_the_file_states() -> None:
     viscous, dry = rd.Plant(ROBOT, "urdf").effects
-    np.testing.assert_array_equal([viscous.damping, dry.friction], [[0.8, 0.02], [1.5, 0.01]])
+    np.testing.assert_array_equal([viscous.viscous, dry.coulomb], [[0.8, 0.02], [1.5, 0.01]])
     assert rd.Plant(rd.load("ur5"), effects="urdf").effects == ()
-    np.testing.assert_array_equal(only(rd.effects.ViscousFriction("urdf")).damping, [0.8, 0.02])
-    np.testing.assert_array_equal(only(rd.effects.RegularisedCoulombFriction("urdf")).friction, [1.5, 0.01])
+    np.testing.assert_array_equal(only(rd.effects.ViscousFriction("urdf")).viscous, [0.8, 0.02])
+    np.testing.assert_array_equal(only(rd.effects.RegularisedCoulombFriction("urdf")).coulomb, [1.5, 0.01])
     np.testing.assert_array_equal(only(rd.effects.EffortLimit("urdf")).limit, [100.0, np.inf])
     np.testing.assert_array_equal(only(rd.effects.JointStopSpring("urdf", "urdf", 1.0)).upper[0], 2.0)
 
@@ -253,7 +253,7 @@ def test_urdf_is_what_the_file_states() -> None:
 def test_an_effect_given_by_name_is_left_as_it_was() -> None:
     effect = rd.effects.ViscousFriction({"hinge": 0.3})
     only(effect)
-    assert effect.damping == {"hinge": 0.3}
+    assert effect.viscous == {"hinge": 0.3}
 
 
 def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import MissingTimeError
+from robot_dyn.foundations import MissingTimeError
 from tests.user_parts import Push
 
 ARM = rd.load("planar_2r")

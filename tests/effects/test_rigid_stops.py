@@ -228,7 +228,7 @@ def test_rollouts_are_the_runs_of_simulate(method: str) -> None:
     setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_every_s=0.1, engine="compiled", method=method,
                      estimate_error=False)  # fmt: skip
     levels = np.array([[3.0, 1.0], [0.5, 2.0]])
-    runs = rd.rollouts(setup, params={"dry_friction.level": levels})
+    runs = rd.rollouts(setup, params={"dry_friction.coulomb": levels})
     for i, level in enumerate(levels):
         one = rd.simulate(setup, plant=rd.Plant(ARM, [rd.effects.DryFriction(level), plant.effects[1]]))
         assert runs.q is not None

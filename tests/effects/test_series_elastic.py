@@ -170,7 +170,7 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
 def test_dry_friction_of_a_joint_holds_it_until_its_spring_has_the_load() -> None:
     """A motor at constant speed behind a spring: the joint sticks until k δ reaches the friction of rest; 1e-9."""
     speed, level = 0.3, 2.0
-    drive = rd.effects.SeriesElastic(K, J, RATIO, friction=1e3)  # its friction keeps the speed u/b, to 1e-3 of it
+    drive = rd.effects.SeriesElastic(K, J, RATIO, viscous=1e3)  # its friction keeps the speed u/b, to 1e-3 of it
     plant = rd.Plant(SLIDER, [drive, rd.effects.DryFriction(1.0, level)])
     run = rd.simulate(plant, [0.0], duration_s=0.2, controller=Ramp(1e3 * speed), **OFTEN)
     first = next(each for each in run.events if each.name == "slide slides")

@@ -112,11 +112,11 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
     machine = machine_code(
-        equation_of(made), lanes=lanes, extras=(), swept=("viscous_friction.damping",), jacobian=True
+        equation_of(made), lanes=lanes, extras=(), swept=("viscous_friction.viscous",), jacobian=True
     )
     m = machine.equation.size
     y, out = rng.normal(size=(m, lanes)), np.empty((m + 1, m, lanes))
-    run_parameters = machine.run_parameters({"viscous_friction.damping": damping})
+    run_parameters = machine.run_parameters({"viscous_friction.viscous": damping})
     machine.in_python.jacobian(0.37, y, segment_table(made).parameters[0], run_parameters, out)
     for b in (0, 7, 15):
         effects = rd.effects.ViscousFriction(damping[b]), *EFFECTS[1:]

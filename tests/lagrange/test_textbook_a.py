@@ -207,15 +207,17 @@ def test_a7_lagrange_equations_of_any_energies_in_any_coordinates() -> None:
     )
     gamma, force = 1 / np.sqrt(1 - (v * v).sum(-1, keepdims=True) / c**2), F - k * q
     expected = (force - (force * v).sum(-1, keepdims=True) * v / c**2) / (gamma * m)
-    np.testing.assert_allclose(particle.forward_dynamics(0.0, q, v, F), expected, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(particle.momentum(0.0, q, v), gamma * m * v, rtol=1e-13)
+    np.testing.assert_allclose(particle.forward_dynamics(q, v, F), expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(particle.momentum(q, v), gamma * m * v, rtol=1e-13)
     with pytest.raises(RobotDynError, match="not quadratic in v"):
-        particle.C(0.0, q, v)
+        particle.C(q, v)
 
     filling = euler_lagrange(lambda t, q, v: (1 + t**2) * v[0] ** 2 / 2, None, 1)  # d((1 + t²) v)/dt = F
     t = rng.normal(size=(COUNT, 1))
     by_momentum = (F[:, :1] - 2 * t * v[:, :1]) / (1 + t**2)
-    np.testing.assert_allclose(filling.forward_dynamics(t[:, 0], q[:, :1], v[:, :1], F[:, :1]), by_momentum, atol=1e-14)
+    np.testing.assert_allclose(
+        filling.forward_dynamics(q[:, :1], v[:, :1], F[:, :1], t=t[:, 0]), by_momentum, atol=1e-14
+    )
 
     def kinetic(t, q, v):
         return (2 + ca.cos(q[1])) * v[0] ** 2 + v[0] * v[1] * ca.sin(q[0] + t) + v[1] ** 2 + v[0] ** 4 + t * v[1] * q[0]
@@ -236,8 +238,8 @@ def test_a7_lagrange_equations_of_any_energies_in_any_coordinates() -> None:
     J = np.stack([np.stack([one, c1 / 2], -1), np.stack([s[:, 0] / 2, one], -1)], axis=-2)
     J_dot_w = np.stack([-np.sin(s[:, 1]) * w[:, 1] ** 2 / 2, w[:, 0] ** 2 / 2], axis=-1)
     at_q = np.stack([s[:, 0] + np.sin(s[:, 1]) / 2, s[:, 1] + s[:, 0] ** 2 / 4], axis=-1)
-    a_q = of_q.forward_dynamics(t, at_q, np.matvec(J, w), Q)
-    a_s = of_s.forward_dynamics(t, s, w, np.vecmat(Q, J))  # Q_s = Jᵀ Q_q
+    a_q = of_q.forward_dynamics(at_q, np.matvec(J, w), Q, t=t)
+    a_s = of_s.forward_dynamics(s, w, np.vecmat(Q, J), t=t)  # Q_s = Jᵀ Q_q
     np.testing.assert_allclose(np.matvec(J, a_s) + J_dot_w, a_q, rtol=0, atol=1e-11 * np.abs(a_q).max())
 
 
@@ -247,8 +249,8 @@ def test_a8_falling_ball() -> None:
     for m, g in rng.uniform(0.1, 20, (10, 2)):
         ball = euler_lagrange(lambda t, q, v, m=m: m * v[0] ** 2 / 2, lambda t, q, m=m, g=g: m * g * q[0], 1)
         h, v, a, F = rng.normal(size=(4, COUNT, 1))
-        np.testing.assert_allclose(ball.inverse_dynamics(0.0, h, v, a), m * a + m * g, rtol=0, atol=1e-15 * m * (g + 5))
-        np.testing.assert_allclose(ball.forward_dynamics(0.0, h, v, F), F / m - g, rtol=0, atol=1e-15 * (5 / m + g))
+        np.testing.assert_allclose(ball.inverse_dynamics(h, v, a), m * a + m * g, rtol=0, atol=1e-15 * m * (g + 5))
+        np.testing.assert_allclose(ball.forward_dynamics(h, v, F), F / m - g, rtol=0, atol=1e-15 * (5 / m + g))
 
 
 def free_body() -> EulerLagrange:
@@ -288,7 +290,7 @@ def test_a9_newton_euler_in_world_axes_follows_from_lagrange_in_euler_angles() -
     E_dot_v = v[:, 3, None] * np.cross(of_yaw + v[:, 4, None] * y, x) + v[:, 4, None] * np.cross(of_yaw, y)
 
     Q = np.concatenate([wrench[:, :3], np.vecmat(wrench[:, 3:], E)], axis=-1)
-    a = free_body().forward_dynamics(0.0, q, v, Q)
+    a = free_body().forward_dynamics(q, v, Q)
     derived = np.concatenate([a[:, :3], np.matvec(E, a[:, 3:]) + E_dot_v], axis=-1)
     newton_euler = world_acceleration(BODY, R, omega, wrench)
     np.testing.assert_allclose(newton_euler, derived, rtol=0, atol=1e-11 * np.abs(derived).max())
@@ -332,7 +334,7 @@ def test_a11_cylinder_rolls_with_two_thirds_of_g_sin_alpha(seed: int) -> None:
     rolling = euler_lagrange(
         lambda t, q, v: m * v[0] ** 2 / 2 + Izz * (v[0] / r) ** 2 / 2, lambda t, q: -m * g * np.sin(alpha) * q[0], 1
     )
-    np.testing.assert_allclose(rolling.forward_dynamics(0.0, [0.4], [-1.2], [0.0]), [expected], rtol=1e-14)
+    np.testing.assert_allclose(rolling.forward_dynamics([0.4], [-1.2], [0.0]), [expected], rtol=1e-14)
 
     # Newton–Euler: x down the slope, y off it, z along the axis. Downhill roll is ω_z < 0; contact at −r y.
     weight = m * g * np.array([np.sin(alpha), -np.cos(alpha), 0])

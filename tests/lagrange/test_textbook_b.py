@@ -70,7 +70,7 @@ def test_b2_two_particles_on_a_rod_move_as_newton_and_the_rods_force_say(swing: 
     q[:, 3], v = rng.uniform(0.3, np.pi - 0.3, COUNT), v[:, :5]
     force = generalized_force(positions, 5)
     Q = np.stack([force(*each) for each in zip(t, q, F.reshape(COUNT, 2, 3), strict=True)])
-    a = system.forward_dynamics(t, q, v, Q)
+    a = system.forward_dynamics(q, v, Q, t=t)
 
     # Newton: w = r₂ − r₁ = d e_r
     d, d1, d2 = (
@@ -100,9 +100,9 @@ def test_b2_two_particles_on_a_rod_move_as_newton_and_the_rods_force_say(swing: 
     np.testing.assert_allclose(a[:, :3] + d2 * e_r + 2 * d1 * u1 + d * u2, r2, rtol=0, atol=1e-12 * scale)
     if swing:
         with pytest.raises(RobotDynError, match="K depends on t"):
-            system.C(t, q, v)
+            system.C(q, v, t=t)
     else:
-        total = np.matvec(system.M(t, q, v), a) + np.matvec(system.C(t, q, v), v) + system.N(t, q)
+        total = np.matvec(system.M(q, v, t=t), a) + np.matvec(system.C(q, v, t=t), v) + system.N(q, t=t)
         np.testing.assert_allclose(total, Q, rtol=0, atol=1e-12 * scale)
 
 
@@ -117,10 +117,10 @@ def test_b2_bead_on_a_turning_hoop_keeps_jacobis_integral() -> None:
         [m], lambda t, q: [r * direction(ca.pi - q[0], Omega * t)], 1, gravity=(0, 0, -GRAVITY)
     )
     t, q, v = np.random.default_rng(3).uniform(-3, 3, (3, COUNT))
-    a = hoop.forward_dynamics(t, q[:, None], v[:, None], np.zeros(1))[:, 0]
+    a = hoop.forward_dynamics(q[:, None], v[:, None], np.zeros(1), t=t)[:, 0]
     np.testing.assert_allclose(a, np.sin(q) * (Omega**2 * np.cos(q) - GRAVITY / r), rtol=0, atol=1e-13 * Omega**2)
     h = m * r**2 * (v**2 - Omega**2 * np.sin(q) ** 2) / 2 - m * GRAVITY * r * np.cos(q)
-    np.testing.assert_allclose(hoop.jacobi_integral(t, q[:, None], v[:, None]), h, rtol=0, atol=1e-14 * m * r * 40)
+    np.testing.assert_allclose(hoop.jacobi_integral(q[:, None], v[:, None], t=t), h, rtol=0, atol=1e-14 * m * r * 40)
     kept = v * (m * r**2 * a - m * r**2 * Omega**2 * np.sin(q) * np.cos(q) + m * GRAVITY * r * np.sin(q))  # ḣ
     np.testing.assert_allclose(kept, 0, atol=1e-13)
 
@@ -134,8 +134,8 @@ def test_b3_lagrange_equations_from_newtons() -> None:
     m = 1.7
     line = euler_lagrange(lambda t, q, v: m * v[0] ** 2 / 2, None, 1)
     x, v, Q = rng.normal(size=(3, COUNT, 1))
-    np.testing.assert_allclose(line.momentum(0.0, x, v), m * v, rtol=1e-15)
-    np.testing.assert_allclose(line.forward_dynamics(0.0, x, v, Q), Q / m, rtol=1e-15)
+    np.testing.assert_allclose(line.momentum(x, v), m * v, rtol=1e-15)
+    np.testing.assert_allclose(line.forward_dynamics(x, v, Q), Q / m, rtol=1e-15)
 
     def positions(t, q):
         return [q[0] * direction(q[1], q[2])]
@@ -144,7 +144,7 @@ def test_b3_lagrange_equations_from_newtons() -> None:
     q, v, F = rng.uniform(0.4, 2.7, (COUNT, 3)), rng.normal(size=(COUNT, 3)), rng.normal(size=(COUNT, 3))
     Q = np.stack([force(0.0, *each) for each in zip(q, F[:, None], strict=True)])
     (r, theta, phi), (dr, dth, dph) = q.T, v.T
-    ddr, ddth, ddph = system.forward_dynamics(0.0, q, v, Q).T
+    ddr, ddth, ddph = system.forward_dynamics(q, v, Q).T
     s, c = np.sin(theta), np.cos(theta)
     newton = m * np.stack(
         [
@@ -220,13 +220,13 @@ def test_b5_planar_2r_arm_from_its_energies_is_the_closed_form_and_the_urdf() ->
         M, C, N = closed_form(*bars, q, v)
         arm = planar_2r(*bars)
         scale = 1e-13 * M.max()
-        np.testing.assert_allclose(arm.M(0.0, q, v), M, rtol=0, atol=scale)
-        np.testing.assert_allclose(arm.C(0.0, q, v), C, rtol=0, atol=6 * scale)
-        np.testing.assert_allclose(arm.N(0.0, q), N, rtol=0, atol=1e-13 * np.abs(N).max())
+        np.testing.assert_allclose(arm.M(q, v), M, rtol=0, atol=scale)
+        np.testing.assert_allclose(arm.C(q, v), C, rtol=0, atol=6 * scale)
+        np.testing.assert_allclose(arm.N(q), N, rtol=0, atol=1e-13 * np.abs(N).max())
     for engine in (robot, rd.Lagrangian(robot)):  # the last bars are those of the file
-        np.testing.assert_allclose(engine.M(q), arm.M(0.0, q, v), rtol=0, atol=scale)
-        np.testing.assert_allclose(engine.C(q, v), arm.C(0.0, q, v), rtol=0, atol=6 * scale)
-        np.testing.assert_allclose(engine.N(q), arm.N(0.0, q), rtol=0, atol=1e-13 * np.abs(N).max())
+        np.testing.assert_allclose(engine.M(q), arm.M(q, v), rtol=0, atol=scale)
+        np.testing.assert_allclose(engine.C(q, v), arm.C(q, v), rtol=0, atol=6 * scale)
+        np.testing.assert_allclose(engine.N(q), arm.N(q), rtol=0, atol=1e-13 * np.abs(N).max())
 
     _, (_, r2), l1, _ = bars
     centre = generalized_force(
@@ -247,12 +247,12 @@ def test_b6_inertia_coriolis_vector_and_gravity_make_up_the_torque() -> None:
     rng = np.random.default_rng(6)
     q, v, a = rng.uniform(-3, 3, (3, COUNT, 2))
     arm, robot = planar_2r(*uniform_bars(None)), rd.load("planar_2r").with_(gravity=(0.0, 0.0, -GRAVITY))
-    tau, rest = arm.inverse_dynamics(0.0, q, v, a), 0 * v
-    B = arm.M(0.0, q, v)
-    vector, G = np.matvec(arm.C(0.0, q, v), v), arm.inverse_dynamics(0.0, q, rest, rest)
+    tau, rest = arm.inverse_dynamics(q, v, a), 0 * v
+    B = arm.M(q, v)
+    vector, G = np.matvec(arm.C(q, v), v), arm.inverse_dynamics(q, rest, rest)
     scale = 1e-13 * np.abs(tau).max()
     np.testing.assert_allclose(np.matvec(B, a) + vector + G, tau, rtol=0, atol=scale)
-    np.testing.assert_allclose(arm.bias(0.0, q, 3 * v) - G, 9 * vector, rtol=0, atol=10 * scale)
+    np.testing.assert_allclose(arm.bias(q, 3 * v) - G, 9 * vector, rtol=0, atol=10 * scale)
     np.testing.assert_allclose(robot.coriolis_torque(q, v), vector, rtol=0, atol=scale)
     np.testing.assert_allclose(robot.inverse_dynamics(q, v, a), tau, rtol=0, atol=scale)
     assert np.linalg.eigvalsh(B).min() > 0

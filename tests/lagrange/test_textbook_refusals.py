@@ -11,7 +11,7 @@ import pytest
 
 from robot_dyn import RobotDynError, euler_lagrange
 from robot_dyn.description import MassProperties, box, combined, cylinder, from_density
-from robot_dyn.foundations import OverflowedError, QueryError, SingularError
+from robot_dyn.foundations import MissingTimeError, OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange import angular_momentum, body_acceleration, body_wrench, lagrangian_of_particles, world_wrench
 from robot_dyn.lagrange.generalized_force import generalized_force
 
@@ -34,12 +34,12 @@ def unit_mass(t, q, v):
         (lambda: euler_lagrange(lambda t, q, v: ca.SX.sym("m") * v[0] ** 2, None, 1), "cannot be evaluated"),
         (lambda: euler_lagrange(unit_mass, lambda t, q: math.cos(q[0]), 1), "not finite; use casadi.sin"),
         (lambda: euler_lagrange(unit_mass, cast(Any, lambda t: t), 1), r"V\(t, q\) cannot be evaluated"),
-        (lambda: PENDULUM.M(0.0, [1.0, 2.0], ZERO), r"q must have shape \(1,\) or \(..., 1\), got \(2,\)"),
-        (lambda: PENDULUM.M(0.0, NAN, ZERO), "q must be finite, got nan"),
-        (lambda: PENDULUM.bias(np.inf, ZERO, ZERO), "t must be finite, got inf"),
-        (lambda: PENDULUM.forward_dynamics(0.0, ZERO, ZERO, "much"), "Q must be an array of real numbers"),
-        (lambda: PENDULUM.bias(0.0, np.zeros((2, 1)), np.zeros((3, 1))), "batch axes of v"),
-        (lambda: PENDULUM.inverse_dynamics(np.zeros(2), ZERO, ZERO, np.zeros((3, 1))), "batch axes of a"),
+        (lambda: PENDULUM.M([1.0, 2.0], ZERO), r"q must have shape \(1,\) or \(..., 1\), got \(2,\)"),
+        (lambda: PENDULUM.M(NAN, ZERO), "q must be finite, got nan"),
+        (lambda: PENDULUM.bias(ZERO, ZERO, t=np.inf), "t must be finite, got inf"),
+        (lambda: PENDULUM.forward_dynamics(ZERO, ZERO, "much"), "Q must be an array of real numbers"),
+        (lambda: PENDULUM.bias(np.zeros((2, 1)), np.zeros((3, 1))), "batch axes of v"),
+        (lambda: PENDULUM.inverse_dynamics(ZERO, ZERO, np.zeros((3, 1)), t=np.zeros(2)), "batch axes of a"),
         (lambda: generalized_force(lambda t, q: [q], 2), r"position 0 must have shape \(3, 1\)"),
         (lambda: generalized_force(lambda t, q: [], 2), "at least one particle"),
         (lambda: generalized_force(lambda t, q: q[7], 2), "cannot be evaluated"),
@@ -79,19 +79,19 @@ def test_bad_input_is_refused(make, message: str) -> None:
 def test_no_coriolis_matrix_for_terms_linear_in_v() -> None:
     """A charge in a magnetic field, K = ½ v² + B × q · v / 2: b is gyroscopic, and M alone does not give it."""
     charge = euler_lagrange(lambda t, q, v: unit_mass(t, q, v) + q[0] * v[1] - q[1] * v[0], None, 2)
-    with pytest.raises(RobotDynError, match=r"linear.*use bias\(t, q, v\)"):
-        charge.C(0.0, [0.1, 0.2], [0.3, 0.4])
-    np.testing.assert_allclose(charge.bias(0.0, [0.1, 0.2], [0.3, 0.4]), [-0.8, 0.6], rtol=1e-15)
+    with pytest.raises(RobotDynError, match=r"linear.*use bias\(q, v\)"):
+        charge.C([0.1, 0.2], [0.3, 0.4])
+    np.testing.assert_allclose(charge.bias([0.1, 0.2], [0.3, 0.4]), [-0.8, 0.6], rtol=1e-15)
 
 
 def test_singular_states_are_named() -> None:
     """Polar coordinates at r = 0 have no inertia in the angle; 1/q has no value at 0."""
     polar = euler_lagrange(lambda t, q, v: (v[0] ** 2 + (q[0] * v[1]) ** 2) / 2, None, 2)
     with pytest.raises(SingularError, match=r"q\[1\].*other coordinates"):
-        polar.forward_dynamics(0.0, [0.0, 1.0], [1.0, 1.0], [0.0, 0.0])
+        polar.forward_dynamics([0.0, 1.0], [1.0, 1.0], [0.0, 0.0])
     newton = euler_lagrange(unit_mass, lambda t, q: -1 / q[0], 1)
     with pytest.raises(OverflowedError, match="singular at this state"):
-        newton.forward_dynamics(0.0, [0.0], [1.0], [0.0])
+        newton.forward_dynamics([0.0], [1.0], [0.0])
     with pytest.raises(OverflowedError, match="too large"):
         body_wrench(BODY, np.full(6, 1e200), np.zeros(6))
 
@@ -100,12 +100,28 @@ def test_batches_are_the_states_one_by_one() -> None:
     rng = np.random.default_rng(4)
     arm = euler_lagrange(lambda t, q, v: (1 + t**2) * (2 + ca.cos(q[1])) * v[0] ** 2 + v[1] ** 2, None, 2)
     t, q, v = rng.normal(size=(4, 1)), rng.normal(size=(4, 3, 2)), rng.normal(size=(3, 2))
-    got = arm.bias(t, q, v)
+    got = arm.bias(q, v, t=t)
     assert got.shape == (4, 3, 2)
-    one_by_one = [[arm.bias(t[i, 0], q[i, j], v[j]) for j in range(3)] for i in range(4)]
+    one_by_one = [[arm.bias(q[i, j], v[j], t=t[i, 0]) for j in range(3)] for i in range(4)]
     np.testing.assert_array_equal(got, one_by_one)
-    assert arm.M(0.0, np.zeros((0, 2)), np.zeros(2)).shape == (0, 2, 2)
-    assert arm.energy(0.0, q, v).shape == (4, 3)
+    assert arm.M(np.zeros((0, 2)), np.zeros(2), t=0.0).shape == (0, 2, 2)
+    assert arm.energy(q, v, t=0.0).shape == (4, 3)
+
+
+def test_a_missing_time_is_an_error_only_if_the_result_depends_on_it() -> None:
+    q, v, a = np.random.default_rng(5).normal(size=(3, 2))
+    growing = euler_lagrange(lambda t, q, v: (1 + t**2) * unit_mass(t, q, v), lambda t, q: q[0] ** 2, 2)
+    np.testing.assert_array_equal(growing.N(q), growing.N(q, t=3.0))
+    for query in (growing.M, growing.bias, growing.momentum, growing.energy, growing.jacobi_integral):
+        with pytest.raises(MissingTimeError):
+            query(q, v)
+    for query in (growing.inverse_dynamics, growing.forward_dynamics):
+        with pytest.raises(MissingTimeError):
+            query(q, v, a)
+    fixed = euler_lagrange(unit_mass, lambda t, q: t * q[0], 2)
+    np.testing.assert_array_equal(fixed.M(q, v), fixed.M(q, v, t=3.0))
+    with pytest.raises(MissingTimeError):
+        fixed.N(q)
 
 
 def test_the_energy_of_a_system_at_rest_in_time_is_its_jacobi_integral() -> None:
@@ -118,7 +134,7 @@ def test_the_energy_of_a_system_at_rest_in_time_is_its_jacobi_integral() -> None
 
     fixed = euler_lagrange(lambda t, q, v: (2 + ca.cos(q[1])) * v[0] ** 2 + v[1] ** 2, potential, 2)
     expected = (2 + np.cos(q[:, 1])) * v[:, 0] ** 2 + v[:, 1] ** 2 + 9.81 * np.cos(q[:, 0]) + 2 * q[:, 1] ** 2
-    np.testing.assert_allclose(fixed.energy(0.0, q, v), expected, rtol=1e-14, atol=1e-13)  # rounding of terms up to 50
-    np.testing.assert_allclose(fixed.jacobi_integral(0.0, q, v), expected, rtol=1e-14, atol=1e-13)
+    np.testing.assert_allclose(fixed.energy(q, v), expected, rtol=1e-14, atol=1e-13)  # rounding of terms up to 50
+    np.testing.assert_allclose(fixed.jacobi_integral(q, v), expected, rtol=1e-14, atol=1e-13)
     moving = euler_lagrange(lambda t, q, v: (v[0] + 3.0) ** 2 + v[1] ** 2, potential, 2)
-    assert np.abs(moving.energy(0.0, q, v) - moving.jacobi_integral(0.0, q, v)).min() > 1.0
+    assert np.abs(moving.energy(q, v) - moving.jacobi_integral(q, v)).min() > 1.0

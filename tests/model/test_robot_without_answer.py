@@ -333,6 +333,8 @@ def test_nan_rows_hide_no_error_of_the_query_itself(engine: Any) -> None:
         out = np.zeros((2, 6, 6))
         out.flags.writeable = False
         engine.nan_rows.M(np.ones((2, 6)), out=out)
+    with pytest.raises(rd.RobotDynError, match="pass the robot itself"):
+        rd.Plant(engine.nan_rows)
 
 
 def test_compiled_plants_and_derivatives_have_nan_rows() -> None:

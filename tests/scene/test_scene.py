@@ -182,7 +182,7 @@ lower_rad = -1.0
 upper_rad = {slide = 1.0}
 [[effect]]
 kind = "viscous_friction"
-damping_N_m_s_per_rad = 0.3
+viscous_N_m_s_per_rad = 0.3
 [[effect]]
 kind = "line_spring_damper"
 frame = "pole"

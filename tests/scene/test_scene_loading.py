@@ -92,7 +92,7 @@ def test_explanations_of_a_scene_name_what_acts_of_its_file(tmp_path: Path) -> N
     assert {"armature", "gravity"} <= {*answer.absent}
 
 
-DRY = '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0'
+DRY = '[[effect]]\nkind = "dry_friction"\ncoulomb_N_m = 1.0'
 
 
 @pytest.mark.parametrize(

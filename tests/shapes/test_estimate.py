@@ -107,7 +107,7 @@ def test_a_mesh_whose_parts_overlap_is_refused_unless_it_is_allowed(tmp_path: Pa
     robot = estimated(path, density=1000, allow_overlap=True)
     box = solid_box(30.0, 0.3, 0.2, 0.5)
     same(body(robot, "link1"), combined([box, box.moved(np.eye(3), [0.03, 0, 0])]), 1e-6)
-    repaired = rd.tools.doctor.check(path, density=1000, allow_overlap=True).repaired
+    repaired = rd.tools.doctor.check_urdf(path, density=1000, allow_overlap=True).repaired
     assert repaired is not None
     np.testing.assert_array_equal(rd.Robot.from_text(repaired).M([0.3]), robot.M([0.3]))
 
@@ -208,15 +208,15 @@ def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:
 def test_the_corrected_file_of_the_doctor_is_the_robot_that_is_loaded(tmp_path: Path) -> None:
     path = arm(tmp_path, BOX, ROD)
     masses = {"mass": {"link1": 3.0}, "total_mass": 9.0}
-    checkup = rd.tools.doctor.check(path, **masses)  # pyright: ignore[reportArgumentType]
-    assert checkup.repaired is not None and b"<!-- robot-dyn check: " in checkup.repaired
+    checkup = rd.tools.doctor.check_urdf(path, **masses)  # pyright: ignore[reportArgumentType]
+    assert checkup.repaired is not None and b"<!-- robot-dyn check-urdf: " in checkup.repaired
     repaired, loaded = rd.Robot.from_text(checkup.repaired), estimated(path, **masses)
     assert repaired.estimated == loaded.estimated
     np.testing.assert_array_equal(repaired.M([0.3, -0.4]), loaded.M([0.3, -0.4]))
-    found = [each for each in rd.tools.doctor.check(path).findings if each.kind == "inertial_missing"]
+    found = [each for each in rd.tools.doctor.check_urdf(path).findings if each.kind == "inertial_missing"]
     assert len(found) == 3 and not any(each.changes for each in found)
     (tmp_path / "fixed.urdf").write_bytes(checkup.repaired)
-    kinds = [each.kind for each in rd.tools.doctor.check(tmp_path / "fixed.urdf").findings]
+    kinds = [each.kind for each in rd.tools.doctor.check_urdf(tmp_path / "fixed.urdf").findings]
     assert kinds.count("inertial_estimated") == 3 and "inertial_missing" not in kinds
 
 
@@ -242,7 +242,7 @@ def test_masses_that_say_nothing_are_refused(tmp_path: Path, masses: dict[str, o
         estimated(path, **masses)
     if masses:
         with pytest.raises(rd.RobotDynError, match=re.escape(message)):
-            rd.tools.doctor.check(path, **masses)  # pyright: ignore[reportArgumentType]
+            rd.tools.doctor.check_urdf(path, **masses)  # pyright: ignore[reportArgumentType]
 
 
 def test_a_shape_that_cannot_be_read_is_refused(tmp_path: Path) -> None:

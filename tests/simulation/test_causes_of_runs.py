@@ -28,7 +28,7 @@ def plants() -> dict[str, rd.Plant]:
         "payload": rd.Plant(ur5, [E.CarriedPayload(BODY, 0.1, 0.25), push]),
         "Dahl": rd.Plant(arm, [E.DahlFriction(50.0, 0.4)]),
         "LuGre": rd.Plant(arm, [E.LuGreFriction(200.0, 1.0, 0.1, 0.5, 0.7, 0.05)]),
-        "geared motors": rd.Plant(arm, [E.SeriesElastic([900.0, 0.0], 0.01, 10.0, damping=2.0, friction=0.1)]),
+        "geared motors": rd.Plant(arm, [E.SeriesElastic([900.0, 0.0], 0.01, 10.0, damping=2.0, viscous=0.1)]),
         "backlash": rd.Plant(arm, [E.RigidBacklash([0.01, 0.0], 0.01, 10.0, viscous=0.2), E.ViscousFriction(0.2)]),
         "dry friction": rd.Plant(arm, [E.DryFriction(2.0, 2.5)]),
         "stops": rd.Plant(arm, [E.RigidStops([-0.5, -0.2], [0.5, 0.5], 0.3), E.DryFriction(0.7)]),

@@ -218,7 +218,7 @@ def test_a_lag_is_a_state_of_its_own() -> None:
 def test_series_elastic_joints_have_the_matrix_of_two_masses_and_a_spring() -> None:
     """I a = k δ + d (θ̇ − v) − m g l/2 sin q, δ̇ = θ̇ − v, n² J θ̈ = u − k δ − d (θ̇ − v) − b θ̇."""
     k, J, n, d, b, q = 1e4, 1e-4, 100.0, 2.0, 1.0, 0.3
-    drive = rd.effects.SeriesElastic(k, J, n, damping=d, friction=b)
+    drive = rd.effects.SeriesElastic(k, J, n, damping=d, viscous=b)
     system = rd.linearise(rd.Plant(PENDULUM, [drive]), [q])
     bar, motor, load = 1 / 3, n**2 * J, G / 2 * np.sin(q)
     expected = [

@@ -140,7 +140,7 @@ def test_sweeps_are_held_to_what_is_declared() -> None:
     for params, message in (
         ({"kp": [-1.0]}, "params: kp must not be negative"),
         ({"gravity": [[0.0, 0.0]]}, r"params: gravity must have shape \(B, 3\)"),
-        ({"viscous_friction.dampin": [1.0]}, "no 'viscous_friction.dampin'; nearest: viscous_friction.damping"),
+        ({"viscous_friction.viscou": [1.0]}, "no 'viscous_friction.viscou'; nearest: viscous_friction.viscous"),
         ({"external_wrench.start_s": [0.1]}, "no 'external_wrench.start_s'"),
     ):
         with pytest.raises(QueryError, match=message):

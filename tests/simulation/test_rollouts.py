@@ -64,8 +64,8 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     weightless, far = ARM.with_(gravity=(0.0, 0.0, 0.0)), starts(3)
     far[1] = 2e5, 0.3  # [rad]: the sine of a tile is no longer exact there, and the run is made alone
     gains = {"kp": rng.uniform(20, 60, 5), "kd": rng.uniform(2, 5, (5, 2))}
-    gains |= {"viscous_friction.damping": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
-    masses = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.damping": rng.uniform(0, 1, 70)}
+    gains |= {"viscous_friction.viscous": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
+    masses = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.viscous": rng.uniform(0, 1, 70)}
     known = rd.control.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0)
     stops = rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
     levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
@@ -136,12 +136,12 @@ def test_the_setup_of_a_run_has_its_values() -> None:
     """Gains, coefficients of effects, levels, gravity and masses; the model of a controller keeps its own."""
     for name, parts in {
         "gains and friction": lambda x: {
-            "kp": x.controller.kp, "kd": x.controller.kd, "viscous_friction.damping": x.plant.effects[0].damping,
+            "kp": x.controller.kp, "kd": x.controller.kd, "viscous_friction.viscous": x.plant.effects[0].viscous,
             "effort_limit.limit": x.plant.effects[2].limit,
         },
         "masses unknown to the model": lambda x: {
             f"payload_mass:{ARM_TIP}": x.plant.dynamics.edits.payloads[0].mass,
-            "viscous_friction.damping": x.plant.effects[0].damping,
+            "viscous_friction.viscous": x.plant.effects[0].viscous,
         },
         "chosen steps": lambda x: {"kp": x.controller.kp, "joint_stops.upper": x.plant.effects[1].upper},
         "levels": lambda x: {
@@ -231,9 +231,9 @@ def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
 def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
     """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
-    params = {"viscous_friction.damping": np.array([[0.3, 0.1], [0.7, 0.2], [0.0, 0.4]])}
+    params = {"viscous_friction.viscous": np.array([[0.3, 0.1], [0.7, 0.2], [0.0, 0.4]])}
     runs = rd.rollouts(setup, starts(3), params=params, record=record)
-    effects = [rd.effects.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
+    effects = [rd.effects.ViscousFriction(params["viscous_friction.viscous"][-1]), *PLANT.effects[1:]]
     alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
     run = runs[-1]
     for name in ("t", "q", "v", "desired", "tracking_error"):
@@ -370,14 +370,14 @@ def test_what_has_no_meaning_is_refused() -> None:
         "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
         r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"params": {"mass_scale": 1.1}},
         "no 'kq'; nearest: k": {"params": {"kq": ones}},
-        "no 'viscous_friction.damp'; nearest: viscous_friction.damping": {"params": {"viscous_friction.damp": ones}},
+        "no 'viscous_friction.visc'; nearest: viscous_friction.viscous": {"params": {"viscous_friction.visc": ones}},
         "kp must not be negative": {"params": {"kp": [-1.0]}},
         r"no 'payload_mass:elbow': the arm carries no payload; add one, as robot.with_\(payload=": {
             "params": {"payload_mass:elbow": ones}
         },
         "velocity_scale": {"params": {"regularised_coulomb_friction.velocity_scale": np.zeros(2)}},
-        r"several effects of the plant; give 'viscous_friction 1\.damping' and 'visc": {
-            "plant": two, "params": {"viscous_friction.damping": ones},
+        r"several effects of the plant; give 'viscous_friction 1\.viscous' and 'visc": {
+            "plant": two, "params": {"viscous_friction.viscous": ones},
         },
         "params must give values by name, such as": {"params": [1]},
         "params must give values by name, .*3": {"params": {3: ones}},

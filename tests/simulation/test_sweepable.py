@@ -45,7 +45,7 @@ def test_each_one_can_be_swept_and_has_the_value_of_the_setup(every: int) -> Non
 def test_units_are_those_of_the_joints() -> None:
     """cart_pole slides and turns."""
     units = {each.name: each.unit for each in rd.sweepable(setup()).parameters}
-    assert units["viscous_friction.damping"] == "N s/m or N m s/rad"
+    assert units["viscous_friction.viscous"] == "N s/m or N m s/rad"
     assert units["position.quantisation.resolution"] == "m or rad"
     assert (units["gravity"], units["mass_scale"], units["pole.inertia"]) == ("m/s²", "", "kg m²")
 

@@ -84,17 +84,17 @@ def test_what_was_swept_has_its_unit() -> None:
     """By joint where it is of joints, else numbered if it has several numbers; to the bit."""
     params = {
         "payload_mass:tip": [0.1, 0.2],
-        "viscous_friction.damping": [[0.4, 1 / 3], [0.5, 0.06]],
+        "viscous_friction.viscous": [[0.4, 1 / 3], [0.5, 0.06]],
         "mass_scale": [1.0, 1.1],
         "gravity": [[0.0, 0.0, -9.81], [0.0, 0.0, -1.6]],
     }
     arm = rd.load("planar_2r").with_(payload=rd.Payload("tip", 0.1))
     plant = rd.Plant(arm, [rd.effects.ViscousFriction([0.4, 0.05])])
     table = rd.rollouts(plant, [0.3, 0.2], params=params, duration_s=0.01).table()
-    damping = [f"viscous_friction.damping {name} [N m s/rad]" for name in arm.joint_names]
+    damping = [f"viscous_friction.viscous {name} [N m s/rad]" for name in arm.joint_names]
     gravity = [f"gravity {k} [m/s²]" for k in (1, 2, 3)]
     assert list(table)[1:8] == ["payload_mass:tip [kg]", *damping, "mass_scale", *gravity]
-    np.testing.assert_array_equal(np.stack([table[name] for name in damping], 1), params["viscous_friction.damping"])
+    np.testing.assert_array_equal(np.stack([table[name] for name in damping], 1), params["viscous_friction.viscous"])
     np.testing.assert_array_equal(np.stack([table[name] for name in gravity], 1), params["gravity"])
 
 

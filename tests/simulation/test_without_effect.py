@@ -43,8 +43,8 @@ def test_a_wrench_on_an_unknown_link_is_refused_also_where_its_window_is_not_ope
 @pytest.mark.parametrize(
     ("robot", "effect", "message"),
     [
-        (UR5, rd.effects.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states no value"),
-        (UR5, rd.effects.RegularisedCoulombFriction("urdf"), "friction='urdf' has no effect"),
+        (UR5, rd.effects.ViscousFriction("urdf"), "viscous='urdf' has no effect: the file of ur5 states no value"),
+        (UR5, rd.effects.RegularisedCoulombFriction("urdf"), "coulomb='urdf' has no effect"),
         (rd.load("pendulum"), rd.effects.EffortLimit("urdf"), "limit='urdf' has no effect"),
         (rd.load("pendulum"), rd.effects.JointStopSpring("urdf", "urdf", 1e4), "lower='urdf' has no effect"),
     ],
@@ -147,7 +147,7 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
             SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]\nstart_s = 0.05\n',
             "no frame 'tipp'; nearest: tip",
         ),
-        (SCENE + '[[effect]]\nkind = "viscous_friction"\n', "damping='urdf' has no effect"),
+        (SCENE + '[[effect]]\nkind = "viscous_friction"\n', "viscous='urdf' has no effect"),
         (SCENE.replace("0.1", "true"), "duration_s: .*, got True"),
         (SCENE.replace("0.1", '"0.1"'), "duration_s: .*, got '0.1'"),
         (SCENE + "estimate_error = 0\n", "estimate_error: .*, got 0"),
@@ -161,7 +161,7 @@ def test_what_a_scene_states_and_no_run_would_heed_is_refused(text: str, message
 
 
 def test_two_frictions_of_a_scene_add_up(tmp_path) -> None:
-    friction = '[[effect]]\nkind = "viscous_friction"\ndamping_N_m_s_per_rad = 0.3\n'
+    friction = '[[effect]]\nkind = "viscous_friction"\nviscous_N_m_s_per_rad = 0.3\n'
     (tmp_path / "scene.toml").write_text(SCENE + 2 * friction)
     plant = rd.read_scene(tmp_path / "scene.toml").plant
     np.testing.assert_allclose(plant.torque(np.ones(2), np.ones(2), t=0.0), -0.6)

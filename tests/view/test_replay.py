@@ -173,7 +173,7 @@ def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path
         assert max(view.ask(clear.format("ghost 1"))) < 0.5
         assert min(view.ask(clear.format(view.path("forearm_link")))) == 1
         labels = view.ask("[...document.querySelectorAll('.plot')].map(p => p.textContent)")
-        name = rd.compare_runs(fall, other).names[1]
+        name = rd.diff_runs(fall, other).names[1]
         assert all("elbow_joint" in text and f"elbow_joint ({name})" in text for text in labels[:2])
 
 

@@ -18,7 +18,7 @@ _DURATION_S = 1.0
 
 
 @command(TRUST)
-def accuracy(
+def work_precision(
     what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     /,
     budget: Budget = 30.0,

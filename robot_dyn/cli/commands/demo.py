@@ -86,4 +86,4 @@ def _price(swing: rd.Setup) -> Iterator[str]:
     yield from programs(result, _ERROR)
     if result.interrupted:
         raise typer.Exit(130)
-    yield "  all methods: robot-dyn accuracy; each effect and algorithm: robot-dyn cost"
+    yield "  all methods: robot-dyn work-precision; each effect and algorithm: robot-dyn cost"

@@ -112,7 +112,7 @@ def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Itera
     for effect in setup.plant.effects:
         if not isinstance(effect, RegularisedCoulombFriction):
             continue
-        level, part = np.broadcast_to(effect.friction, mean.shape), np.abs(np.tanh(mean / effect.velocity_scale))
+        level, part = np.broadcast_to(effect.coulomb, mean.shape), np.abs(np.tanh(mean / effect.velocity_scale))
         for i in np.flatnonzero(steady & (level > 0) & (part > _LOADED[0]) & (part < _LOADED[1])):
             name, (_, of_v, of_u) = setup.plant.dynamics.joint_names[i], units[i]
             facts: dict[str, float | str] = {

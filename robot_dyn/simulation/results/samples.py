@@ -2,7 +2,7 @@
 
     a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v,   E = K + Σ potentials
 
-The tracking error is √(mean over samples and joints of (q_d − q)²).
+The root mean square of the tracking error is √(mean over samples and joints of (q_d − q)²).
 """
 
 from __future__ import annotations

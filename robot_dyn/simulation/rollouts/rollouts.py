@@ -73,7 +73,7 @@ def rollouts(
         q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; 0, or those of the setup, unless given.
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
-            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …} (of several of a kind
+            {"kp": …}, a coefficient of an effect, as {"viscous_friction.viscous": …} (of several of a kind
             {"external_wrench 2.wrench": …}), "gravity", (B, 3), or of a
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
             "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of

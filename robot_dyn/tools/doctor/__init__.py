@@ -1,6 +1,6 @@
 """The doctor of URDF files: faults, doubtful values, and repairs.
 
-    check    the findings of a file, and its repairs (Checkup)
+    check_urdf    the findings of a file, and its repairs (Checkup)
 
 checkup, report                   the whole check; findings as text
 document, finding                 the file; findings and changes
@@ -8,7 +8,7 @@ spelling, literals, names         findings in the text
 limits, axes, proportions         findings in joints and lengths
 masses, gravity_load              findings in the numbers of the robot
 shapes, estimate                  comparison with the shapes of links; missing inertials
-command                           the command `check`
+command                           the command `check-urdf`
 """
 
 from robot_dyn.foundations import public_names

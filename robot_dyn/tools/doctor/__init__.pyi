@@ -1,6 +1,6 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.tools.doctor.checkup import Checkup as Checkup
-from robot_dyn.tools.doctor.checkup import check as check
+from robot_dyn.tools.doctor.checkup import check_urdf as check_urdf
 
 __all__: list[str]
 

@@ -88,7 +88,7 @@ class Checkup(Answer):
         return page(self.sentence, table(heading, rows, right=("line",)) if self.findings else "")
 
 
-def check(
+def check_urdf(
     name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), mass: Mapping[str, float] | None = None,
     total_mass: float | None = None, density: float | None = None, allow_overlap: bool = False, units: bool = False,
     xacro: Mapping[str, str | float | bool] | None = None,
@@ -190,11 +190,12 @@ def _examined(
             document = _rewritten(document, additions)
             robot = Robot(description.check(document.text, source))
         findings += [*masses.masses(document, robot), *shapes.of_one_density(document, robot, shape_of)]
-        doubtful = shapes.doubtful(document, robot, shape_of, package_dirs)
-        findings += doubtful
+        findings += shapes.doubtful(document, robot, shape_of, package_dirs)
+        findings += [*shapes.directions(document, robot, shape_of, package_dirs, findings)]
+        findings = shapes.with_repairs(document, robot, shape_of, package_dirs, findings)
         findings += masses.beyond_reach(document, robot, findings)
         findings += gravity_load.weak_joints(document, robot, findings)
-        if conversions := [finding for finding in doubtful if finding.changes and (units or not finding.supposed)]:
+        if conversions := [finding for finding in findings if finding.changes and finding.supposed and units]:
             document = _rewritten(document, conversions)
     loads = refusal is None and not any(finding.kind == "refused" for finding in findings)
     repaired = None if document is written or document.text == text else document.text
@@ -294,7 +295,7 @@ def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
             continue
         changed |= places
         for change in finding.changes:
-            comment = etree.Comment(f" robot-dyn check: {_plain(f'{change.text}: {finding.what}')} ")
+            comment = etree.Comment(f" robot-dyn check-urdf: {_plain(f'{change.text}: {finding.what}')} ")
             comment.tail = _indent(change.element)
             change.apply()
             change.element.addprevious(comment)

@@ -1,4 +1,4 @@
-"""The command that checks URDF files: check."""
+"""The command that checks URDF files: check-urdf."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RepairError(RobotDynError):
 
 
 @command("Files")
-def check(
+def check_urdf(
     files: Annotated[list[str], typer.Argument(autocompletion=completion.robots)],
     /,
     fix: bool = False,
@@ -57,7 +57,9 @@ def check(
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
         raise QueryError("--fix: two of the files would get the same name; repair them one by one")
-    checkups = [rd.tools.doctor.check(file, units=units, **options.reading) for file in progress(files, "checking")]
+    checkups = [
+        rd.tools.doctor.check_urdf(file, units=units, **options.reading) for file in progress(files, "checking")
+    ]
     written = {}
     for file, checkup in zip(files, checkups, strict=True):
         if fix and checkup.repaired is not None:

@@ -86,7 +86,7 @@ class Finding:
         remedy: Suggested correction.
         line: Line of the file, or None.
         changes: Changes by `--fix`; empty if the intended value is unclear.
-        supposed: True if the changes assume a suspected unit and need `--units`.
+        supposed: True if the changes undo a suspected unit or mistake and need `--units`.
     """
 
     severity: Severity

@@ -1,13 +1,14 @@
-"""Masses and inertias compared with the shapes of links: values impossible at any density, and suspected units.
+"""Masses and inertias compared with the shapes of links: values impossible at any density, and suspected mistakes.
 
     ½ tr I ≤ m max |x − c|²   for a mass m with centre c anywhere within the shape
 
-Shapes are taken from <collision>, or else from <visual>. [Wensing, Kim, Slotine 2018, §III-B]
+Shapes are taken from <collision>, or else from <visual>; `inertia_bounds` has the bound in each direction.
+[Wensing, Kim, Slotine 2018, §III-B]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import hypot
 from pathlib import Path
@@ -17,17 +18,17 @@ import numpy as np
 
 from robot_dyn import Robot
 from robot_dyn.description import MassProperties, StatedLink, combined, structure_of
+from robot_dyn.foundations import rotation_rpy
 from robot_dyn.shapes import MeshError, surface
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
-from robot_dyn.tools.doctor.literals import NUMBERS
+from robot_dyn.tools.doctor.inertia_bounds import SLACK, Body, excess
+from robot_dyn.tools.doctor.repairs import KEYS, repairs, scaled
 from robot_dyn.view import Piece, solids
 
 _SLACK = 1.1  # on a shape's extent: collision shapes omit screws
 _LIGHT, _HEAVY = 2.0, 1.2e4  # [kg/m³] of a link in its convex hull: lighter than foam, heavier than lead
 _CONCENTRATED = 0.15  # relative to a uniform body's inertia; the minimum of 20 arms in the catalog is 0.35
-_UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
-_WITHIN = 4.0  # largest factor between the inertia of a link and that of a uniform body
 _LONG, _LEAST_LONG = 10.0, 10.0  # times the length of the arm, and [m]: longer shapes are in millimetres
 _SIZE = "shape_in_mm"
 _MATERIAL, _MOST, _FEWEST = (
@@ -35,6 +36,8 @@ _MATERIAL, _MOST, _FEWEST = (
     0.6,
     4,
 )  # deviation from the median density; fraction of links; minimum number of different masses
+IMPOSSIBLE = "inertia_impossible", "inertia_shape", "inertia_direction"
+_EXPLAINED = *IMPOSSIBLE, "mass_density", "com_outside", "inertia_small", "shape_in_mm"
 _GRAVE = 3.0  # ratio of ½ tr I to m d² above which M is wrong by a factor; below, values may be rounded
 
 
@@ -179,7 +182,7 @@ def _mass(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding |
         return None
     grams = density > _HEAVY and 100.0 <= density / 1e3 <= 2e4
     suspected = ": grams are suspected" if grams else ""
-    changes = (Change(mass, "value", _scaled(mass.get("value"), -3)),) if grams else ()
+    changes = (Change(mass, "value", scaled(mass.get("value"), -3)),) if grams else ()
     return Finding(
         Severity.WARNING, "mass_density", f"link {name!r}",
         f'its mass of "{mass.get("value").strip()}" kg in its shape gives a density of {density:.3g} kg/m³{suspected}',
@@ -193,21 +196,12 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
     most = link.mass * far * far
     if half <= _SLACK * most:
         return None
-    changes, suspected = (), ""
-    if shape.unit is not None:
-        ratio = half / link.mass / (np.trace(shape.unit.inertia) / 2 / shape.unit.mass)
-        factor, unit = min(_UNITS.items(), key=lambda item: abs(np.log(ratio / item[0])))
-        if factor / _WITHIN < ratio < factor * _WITHIN:
-            suspected, inertia = f": {unit} is suspected", inertial.find("inertia")
-            power = -round(np.log10(factor))
-            moments = {key: inertia.get(key) for key in NUMBERS["inertia"]}
-            changes = tuple(Change(inertia, key, _scaled(x, power)) for key, x in moments.items() if float(x))
     return Finding(
         Severity.ERROR if half >= _GRAVE * most else Severity.WARNING, "inertia_shape", f"link {name!r}",
         f"for {link.mass:g} kg, its inertia needs mass at least {np.sqrt(half / link.mass):.3g} m from the centre, but"
         f" its shape ends at {far:.3g} m: {half / most:.3g} times the largest inertia of this"
-        f" shape at any density{suspected}",
-        "correct the inertia, or its unit", inertial.sourceline, changes, True,
+        " shape at any density",
+        "correct the inertia, or its unit", inertial.sourceline,
     )  # fmt: skip
 
 
@@ -225,10 +219,92 @@ def _small(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding 
     )  # fmt: skip
 
 
-def _scaled(text: str, power: int) -> str:
-    """Return a literal times a power of ten, digit by digit."""
-    mantissa, _, exponent = text.strip().lower().partition("e")
-    return f"{mantissa}e{int(exponent or 0) + power}"
+def directions(
+    document: Document,
+    robot: Robot,
+    of: dict[str, Shape],
+    package_dirs: Iterable[str | Path],
+    findings: Iterable[Finding],
+) -> Iterator[Finding]:
+    """Report links with more second moment along a direction than their mass can have within visual and collision.
+
+    Links whose mass, centre or moments are doubtful for another reason are left out.
+    """
+    stated = structure_of(robot.description, robot.edits)
+    doubtful = {finding.where for finding in findings if finding.kind in _EXPLAINED}
+    names = {name for name in of if f"link {name!r}" not in doubtful}
+    for name, body in bodies(robot, of, package_dirs, names).items():
+        ratio = excess(body.mass, body.moments, body.points)
+        if ratio > SLACK:
+            severity = Severity.WARNING if ratio > _GRAVE and name not in stated.base else Severity.NOTE
+            inertial = document.named("link", name).find("inertial")
+            yield document.finding(
+                severity, "inertia_direction", inertial,
+                f"along one direction its moments need {ratio:.3g} times the second moment that {body.mass:g} kg can"
+                " have within its shape",
+                "correct the moments: their axes, the signs of the products, or the numbers",
+            )  # fmt: skip
+
+
+def bodies(
+    robot: Robot, of: dict[str, Shape], package_dirs: Iterable[str | Path], names: Container[str]
+) -> dict[str, Body]:
+    """Return links with mass and moments for their bounds; links that the first shape excludes get all their shapes."""
+    inertials = {link.get("name"): link.find("inertial") for link in robot.description.element.iterfind("link")}
+    links = structure_of(robot.description, robot.edits).links
+    result = {
+        name: _body(links[name], inertials[name], shape, shape.points)
+        for name, shape in of.items()
+        if name in names and links[name].mass > 0 and any(links[name].moments)
+    }
+    exceeding = {name for name, body in result.items() if excess(body.mass, body.moments, body.points) > SLACK}
+    pieces, _ = solids(robot, package_dirs, ("visual",), exceeding) if exceeding else ({}, ())
+    for name, drawn in pieces.items():
+        if drawn:
+            points = np.vstack([of[name].points, _shape(drawn).points])
+            result[name] = _body(links[name], inertials[name], of[name], points)
+    return result
+
+
+def _body(link: StatedLink, inertial: Any, shape: Shape, points: np.ndarray) -> Body:
+    """Return a link in the axes of its <inertial>."""
+    R = rotation_rpy(np.array([float(x) for x in inertial.find("origin").get("rpy").split()]))
+    com = np.array(link.com)
+    uniform = None if shape.unit is None else (shape.unit.mass, R.T @ shape.unit.inertia @ R)
+    return Body(link.mass, link.inertia, (points - com) @ R, -com @ R, uniform)
+
+
+def with_repairs(
+    document: Document, robot: Robot, of: dict[str, Shape], package_dirs: Iterable[str | Path], findings: list[Finding]
+) -> list[Finding]:
+    """Return the findings; those on impossible inertias name the mistakes that would explain them."""
+    named = {f"link {name!r}": name for name in of}
+    names = {named[x.where] for x in findings if x.kind in IMPOSSIBLE and x.where in named}
+    of_links = bodies(robot, of, package_dirs, names) if names else {}
+    result: list[Finding] = []
+    for finding in findings:
+        body = of_links.get(named.get(finding.where, "")) if finding.kind in IMPOSSIBLE else None
+        result.append(finding if body is None else _explained(document, named[finding.where], body, finding))
+    return result
+
+
+def _explained(document: Document, name: str, body: Body, finding: Finding) -> Finding:
+    inertial = document.named("link", name).find("inertial")
+    moments, mass = inertial.find("inertia"), inertial.find("mass")
+    candidates = repairs(body, {key: moments.get(key, "0") for key in KEYS}, mass.get("value"))
+    if not candidates:
+        return finding
+    mistakes = ", or ".join(candidate.mistake for candidate in candidates)
+    what = f"{finding.what}: suspected {mistakes}"
+    if len(candidates) > 1:
+        return replace(finding, what=what)
+    (candidate,) = candidates
+    changes = tuple(
+        Change(mass if key == "value" else moments, key, text)
+        for key, text in candidate.texts.items()
+        if text != (mass if key == "value" else moments).get(key, "0")
+    )
+    return replace(finding, what=what, changes=changes, supposed=True)
 
 
 def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:

@@ -25,7 +25,7 @@ def stress(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Find the limits of an arm: posture, step, gain, speed, payload.
+    """Find limits of an arm: posture, step, gain, speed, payload.
 
     The exit code is 1 on failures. Ctrl-C ends the search and keeps the results.
 

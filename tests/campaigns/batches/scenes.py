@@ -42,7 +42,7 @@ def batch(seed: int, index: int) -> Batch:
         _controller(rng, family, arm, q0[0], scale, duration), method,
         record_every_s=float(rng.choice([0.0, 0.02])), estimate_error=False, engine="compiled", **options,
     )  # fmt: skip
-    swept |= {"viscous_friction.damping": scale * rng.uniform(0.1, 1.0, (B, arm.n))}
+    swept |= {"viscous_friction.viscous": scale * rng.uniform(0.1, 1.0, (B, arm.n))}
     params = {key: np.broadcast_to(x, (B, arm.n)) for key, x in swept.items() if rng.random() < 0.5}
     return Batch(setup, q0, v0, params, f"{seed}/{index} {family}, {name}, {method}, h = {step:g} s, {B} runs")
 
@@ -61,7 +61,7 @@ def _effects(
         return [rd.effects.RigidStops(lower, upper, rng.uniform(0, 0.8))], {}
     if family == "dry friction":
         return [rd.effects.DryFriction(scale * rng.uniform(0.5, 5, n))], {
-            "dry_friction.level": scale * rng.uniform(0.5, 5, (B, n))
+            "dry_friction.coulomb": scale * rng.uniform(0.5, 5, (B, n))
         }
     if family == "window":
         start = rng.uniform(0, duration / 2)

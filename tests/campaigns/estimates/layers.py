@@ -76,11 +76,11 @@ def slider_truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14) -
     k = _one(spring.stiffness)
     farthest = float(np.hypot(setup.q0[0], setup.v0[0] * np.sqrt(MASS / k)))
     if isinstance(friction, rd.effects.LuGreFriction):
-        y, width, most = np.append(y, 0.0), _one(friction.stribeck_velocity), _one(friction.breakaway)
+        y, width, most = np.append(y, 0.0), _one(friction.stribeck_velocity), _one(friction.static)
     elif isinstance(friction, rd.effects.DryFriction):
         width, most = _one(friction.stribeck_velocity), _one(friction.static)
     else:
-        width, most = _one(friction.velocity_scale), _one(friction.friction)
+        width, most = _one(friction.velocity_scale), _one(friction.coulomb)
     longest = 2 * width * MASS / (k * farthest + most)  # so that a layer is not stepped over
     result[times <= 0.0] = y[0]
     while t < setup.duration_s:
@@ -95,14 +95,14 @@ def slider_truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14) -
 def _rate(k: float, friction: Any, way: float) -> Rate:
     """The rate of (x, v), or (x, v, z), while v has one sign."""
     if isinstance(friction, rd.effects.DryFriction):
-        low, high, v_s = (_one(x) for x in (friction.level, friction.static, friction.stribeck_velocity))
+        low, high, v_s = (_one(x) for x in (friction.coulomb, friction.static, friction.stribeck_velocity))
         return lambda t, y: [
             y[1], (-k * y[0] - way * (low + (high - low) * exp(-((y[1] / v_s) ** 2)))) / MASS
         ]  # fmt: skip
     if isinstance(friction, rd.effects.RegularisedCoulombFriction):
-        f, v_s = _one(friction.friction), _one(friction.velocity_scale)
+        f, v_s = _one(friction.coulomb), _one(friction.velocity_scale)
         return lambda t, y: [y[1], (-k * y[0] - f * tanh(y[1] / v_s)) / MASS]
-    names = ("bristle_stiffness", "bristle_damping", "viscous", "coulomb", "breakaway", "stribeck_velocity")
+    names = ("bristle_stiffness", "bristle_damping", "viscous", "coulomb", "static", "stribeck_velocity")
     sigma, damping, viscous, low, high, v_s = (_one(getattr(friction, name)) for name in names)
 
     def rate(t: float, y: np.ndarray) -> list[float]:

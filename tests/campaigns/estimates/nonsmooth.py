@@ -53,15 +53,15 @@ class Bodies:
         """Friction of sliding, all in all."""
         made = np.zeros(self.n)
         for each in self.friction:
-            static = each.level if each.static is None else each.static
+            static = each.coulomb if each.static is None else each.static
             curve = 0.0 if each.stribeck_velocity is None else np.exp(-((v / each.stribeck_velocity) ** 2))
-            made = made + each.level + (static - each.level) * curve
+            made = made + each.coulomb + (static - each.coulomb) * curve
         return made
 
     @property
     def rough(self) -> np.ndarray:
         """Friction of rest, all in all."""
-        levels = (x.level if x.static is None else x.static for x in self.friction)
+        levels = (x.coulomb if x.static is None else x.static for x in self.friction)
         return sum((np.broadcast_to(each, self.n) for each in levels), np.zeros(self.n))
 
     def applied(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -173,7 +173,7 @@ class Bristles:
         if isinstance(e, rd.effects.DahlFriction):
             w = 1 - stiffness * z / e.coulomb * way
             return -stiffness * z, np.abs(w) ** (1.0 if e.exponent is None else e.exponent) * np.sign(w) * v
-        level = e.coulomb + (e.breakaway - e.coulomb) * np.exp(-((v / e.stribeck_velocity) ** 2))
+        level = e.coulomb + (e.static - e.coulomb) * np.exp(-((v / e.stribeck_velocity) ** 2))
         rate = v - stiffness * way * v * z / level
         return -(stiffness * z + e.bristle_damping * rate + e.viscous * v), rate
 
@@ -203,11 +203,11 @@ def _rounding(model, q, stiffness) -> float:
 def _force(model, data, effect) -> Callable[[float], Callable]:
     """Torque of an effect on (q, v), for the time at which it is asked."""
     if isinstance(effect, rd.effects.ViscousFriction):
-        return lambda t: lambda q, v: -effect.damping * v
+        return lambda t: lambda q, v: -effect.viscous * v
     if isinstance(effect, rd.effects.Spring):
         return lambda t: lambda q, v: -effect.stiffness * (q - effect.rest)
     if isinstance(effect, rd.effects.RegularisedCoulombFriction):
-        return lambda t: lambda q, v: -effect.friction * np.tanh(v / effect.velocity_scale)
+        return lambda t: lambda q, v: -effect.coulomb * np.tanh(v / effect.velocity_scale)
     assert isinstance(effect, rd.effects.ExternalWrench)
     frame = model.getFrameId(effect.frame)
 

@@ -31,7 +31,7 @@ bristle_stiffness_N_m_per_rad = 100.0
 bristle_damping_N_m_s_per_rad = {hinge = 0.1}
 viscous_N_m_s_per_rad = 0.2
 coulomb_N_m = 0.5
-breakaway_N_m = 0.7
+static_N_m = 0.7
 stribeck_velocity_rad_per_s = 0.1
 [[effect]]
 kind = "line_spring_damper"

@@ -91,7 +91,7 @@ def _change(rng: np.random.Generator, root: etree._Element) -> None:
 def attempt(mutant: bytes, folder: Path) -> str:
     path = folder / "mutant.urdf"
     path.write_bytes(mutant)
-    rd.tools.doctor.check(path)
+    rd.tools.doctor.check_urdf(path)
     robot = rd.load(str(path))
     if len(mutant) % 4 == 0:
         drawing(robot, inertia=True)

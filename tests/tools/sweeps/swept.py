@@ -28,7 +28,7 @@ kind = "gravity"
 
 [[effect]]
 kind = "viscous_friction"
-damping_N_m_s_per_rad = 0.5
+viscous_N_m_s_per_rad = 0.5
 
 [control]
 kind = "pd"
@@ -39,7 +39,7 @@ kd = 4.0
 kind = "hold"
 """
 VARY = {
-    "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.3),
+    "viscous_friction.viscous": sw.lognormal(median=0.5, sigma_of_log=0.3),
     "q0": sw.normal(mean=[0.4, 0.9], sd=0.1),
     "mass_scale": sw.normal(mean=1.0, sd=0.45),  # 1.3 % are negative, which is refused
     "kd": sw.choice([4.0, 4000.0]),  # too much for the step

@@ -120,7 +120,7 @@ def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_pa
     [
         ({"seed": 4}, "seed is 3 there, 4 here"),
         ({"runs": 101}, "runs is 100 there, 101 here"),
-        ({"vary": {"kp": sw.uniform(low=1.0, high=2.0)}}, "vary.viscous_friction.damping is"),
+        ({"vary": {"kp": sw.uniform(low=1.0, high=2.0)}}, "vary.viscous_friction.viscous is"),
         ({"figures": {}}, "figures.error is"),
         ({"design": "latin", "runs": 96}, "runs is 100"),
     ],

@@ -29,7 +29,7 @@ start = {q = [0.4, 0.3]}
 effect = [
   {kind = "gravity"},
   {kind = "effort_limit", limit_N_m = [1.5, 8.0]},
-  {kind = "dry_friction", level_N_m = [1.0, 3.0]},
+  {kind = "dry_friction", coulomb_N_m = [1.0, 3.0]},
 ]
 control = {kind = "pd", kp = 20.0, kd = 2.0}
 reference = {kind = "quintic", q = {joint_1 = 0.5, joint_2 = 0.31}, duration_s = 0.2}
@@ -185,7 +185,7 @@ def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) 
     table = done.table()
     fixed = [f"{column.name} [{column.unit}]" if column.unit else column.name for column in FIXED]
     assert len(rows) == 400 and list(rows[0]) == [
-        *("run", "viscous_friction.damping [N m s/rad]", "q0[0] [rad]", "q0[1] [rad]", "mass_scale", "kd [N m s/rad]"),
+        *("run", "viscous_friction.viscous [N m s/rad]", "q0[0] [rad]", "q0[1] [rad]", "mass_scale", "kd [N m s/rad]"),
         *("error [rad]", "peak [rad/s]", "end [rad]", *fixed),
     ]
     for heading, x in zip(rows[0], table.values(), strict=True):

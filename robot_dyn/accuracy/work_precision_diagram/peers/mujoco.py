@@ -29,7 +29,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
     """Its three methods: viscous friction, lines and servos in C, other torques in Python."""
     module: Any = import_module("mujoco")
     robot, setup, servo, effects = motion.robot, motion.setup, motion.servo, motion.setup.plant.effects
-    damping: Any = sum((each.damping for each in effects if isinstance(each, ViscousFriction)), start=0.0)
+    damping: Any = sum((each.viscous for each in effects if isinstance(each, ViscousFriction)), start=0.0)
     gains = None if servo is None else (servo.kp, servo.kd)
     model = mujoco_model(module, robot, gains, damping, bare=True, lines=motion.lines)
     at = joint_places(model, robot)

@@ -1,4 +1,4 @@
-"""The command that compares two runs: diff."""
+"""The command that compares two runs: diff-runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robot_dyn.cli.options import PRINTED, Results
 
 
 @command(LOOK)
-def diff(a: str, b: str, /, tolerance: float = 1e-06, results: Results = PRINTED) -> None:
+def diff_runs(a: str, b: str, /, tolerance: float = 1e-06, results: Results = PRINTED) -> None:
     """Compare two runs: when they part, what differs.
 
     It prints the rms and the largest difference b − a by joint, and the settings that differ. The exit code is 0.
@@ -22,4 +22,4 @@ def diff(a: str, b: str, /, tolerance: float = 1e-06, results: Results = PRINTED
     from robot_dyn.accuracy.run_difference import RunDifference
 
     paths = results.files(RunDifference, a, b)
-    results.give(rd.compare_runs(arguments.run(a), arguments.run(b), tolerance=tolerance), paths)
+    results.give(rd.diff_runs(arguments.run(a), arguments.run(b), tolerance=tolerance), paths)
