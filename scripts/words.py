@@ -26,8 +26,8 @@ ROOT = Path(__file__).parents[1]
 # lowered to it.
 CEILINGS = {
     "opening": 108,
-    "as of": 30,
-    "what without noun": 113,
+    "as of": 28,
+    "what without noun": 111,
     "is told": 4,
     "says that": 11,
     "tells that": 1,
@@ -35,20 +35,20 @@ CEILINGS = {
     "looks": 18,
     "believes": 7,
     "is no": 9,
-    "of its own": 17,
+    "of its own": 16,
     "behind": 8,
-    "beside": 21,
+    "beside": 20,
     "anew": 0,
-    "likewise": 1,
-    "in place of": 9,
+    "likewise": 0,
+    "in place of": 7,
     "so many": 5,
     "but for": 2,
     "whatever": 6,
-    "of which": 14,
+    "of which": 13,
     "the same holds": 0,
-    "each": 142,
+    "each": 138,
     "arguments": 0,
-    "Any": 806,
+    "Any": 695,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy import empty
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
@@ -50,23 +50,23 @@ class CompiledDynamics(_Derivatives, Parametrised):
 
     Attributes:
         original: Robot passed by the user.
-        dtype: np.float64 or np.float32, or its name; stored as the name.
+        dtype: "float64" or "float32"; np.float64 and np.float32 are stored as their names.
         threads: Number of threads for batches; None for all processors.
         cache: Store compiled code on disk.
     """
 
     original: Robot
-    dtype: Any = "float64"
+    dtype: str = "float64"
     threads: int | None = 1
     cache: bool = True
 
     def __post_init__(self) -> None:
         instance("robot", self.original, Robot, "give a Robot, for example rd.load('ur5')")
-        object.__setattr__(self, "dtype", _dtype(self.dtype))
+        object.__setattr__(self, "dtype", name_of_dtype(self.dtype))
         truth("cache", self.cache)
         thread_count(self.threads)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return CompiledDynamics, (self.original, self.dtype, self.threads, self.cache)
 
     @cached_property
@@ -87,7 +87,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
     def engine(self) -> Engine:
         """Kernels of the robot."""
 
-        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
+        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
             return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
 
         return Engine(
@@ -183,7 +183,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
         return getattr(self.robot, quantity)
 
 
-def _dtype(dtype: Any) -> str:
+def name_of_dtype(dtype: DTypeLike) -> str:
     """Return the name of a NumPy dtype that machine code supports; raise QueryError for any other."""
     name = dtype
     if dtype is not None and not isinstance(dtype, str):

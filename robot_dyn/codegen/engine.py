@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.llvm.one_state import Status
@@ -62,7 +63,7 @@ class Engine:
     traced: Callable[[str], Traced]
     quantities: Mapping[str, Quantity]
     self_check: SelfCheck
-    truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, Any]]
+    truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray | float]]
     dtype: str
     threads: int
     store: Store | None
@@ -121,11 +122,11 @@ class Engine:
     def ask(
         self,
         quantity: str,
-        arguments: tuple[Any, ...],
+        arguments: tuple[ArrayLike, ...],
         out: np.ndarray | None,
         nan: bool,
-        otherwise: Callable[..., Any],
-    ) -> Any:
+        otherwise: Callable[..., ArrayLike],
+    ) -> np.ndarray:
         """Evaluate a quantity in general: check arguments, process batches, leave doubtful states to `otherwise`.
 
         With `nan`, states without a result become NaN.
@@ -165,7 +166,7 @@ class Engine:
         y = np.empty((*batch, *self.shape(quantity)), self.dtype)
         return y if self._run(quantity, flat, y.reshape(len(flat[0]), -1)) is Status.FINE else None
 
-    def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+    def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> np.ndarray | None:
         """Return the result for plain arrays (B, n) if the kernel reports no doubt; otherwise None."""
         requested, states = self.quantities[quantity], getattr(arguments[-1], "shape", ())[:-1]
         if len(states) != 1 or states[0] <= _FEW or not requested.axes:
@@ -190,11 +191,11 @@ class Engine:
             pass
         return None
 
-    def _array(self, name: str, x: Any) -> np.ndarray:
+    def _array(self, name: str, x: object) -> np.ndarray:
         """Convert an argument to an array; the kernel checks faster that its numbers are finite."""
         if name == "t":
             return times(name, x)[..., None]
-        plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
+        plain = type(x) is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
         return x if plain else shaped(name, x, self.joint_names)
 
     def _run(self, quantity: str, inputs: list[np.ndarray], y: np.ndarray) -> Status:

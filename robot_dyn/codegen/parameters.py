@@ -12,17 +12,22 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import Coefficient, declared, with_values
 from robot_dyn.lagrange.tree import Described, tree_of
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
 
-Part = tuple[Any, ...]  # ("effect", i), ("controller",), ("reference", attribute), ("robot",) or ("model", attribute)
+Part = tuple[
+    str | int, ...
+]  # ("effect", i), ("controller",), ("reference", attribute), ("robot",) or ("model", attribute)
 ROBOT: Part = ("robot",)
 CONTROLLER: Part = ("controller",)
 _GRAVITY = Coefficient("m/s²", shapes=((3,),))
@@ -57,7 +62,7 @@ class Parameter:
     entries: tuple[int, ...]
 
     @property
-    def place(self) -> tuple[Any, ...]:
+    def place(self) -> tuple[Part, str, tuple[int, ...]]:
         """Key of its input in machine code: parameters with equal keys share the input."""
         return self.part, self.key, self.entries
 
@@ -84,7 +89,7 @@ class Numbered:
 
 
 def parameters(
-    dynamics: Any, effects: Iterable[Effect], controller: Controller | None, swept: Collection[str] = ()
+    dynamics: Dynamics, effects: Iterable[Effect], controller: Controller | None, swept: Collection[str] = ()
 ) -> tuple[Parameter, ...]:
     """Return all parameters of a plant and its controller; all entries of swept ones are inputs.
 
@@ -112,7 +117,7 @@ def _named(path: str) -> str:
     return path.removeprefix("controller.")
 
 
-def _of_part(part: Any, place: Part, prefix: str, n: int, path: str = "") -> Iterator[Parameter]:
+def _of_part(part: object, place: Part, prefix: str, n: int, path: str = "") -> Iterator[Parameter]:
     for key, coefficient in declared(type(part)).items():
         value = getattr(part, key)
         if value is not None:
@@ -121,12 +126,12 @@ def _of_part(part: Any, place: Part, prefix: str, n: int, path: str = "") -> Ite
             yield Parameter(place, path + key, prefix + key, value, coefficient, tuple(range(value.size)))
 
 
-def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -> Iterator[Parameter]:
+def _of_robot(dynamics: Dynamics, place: Part, prefix: str, swept: Collection[str]) -> Iterator[Parameter]:
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         return
 
-    def parameter(key: str, name: str, value: Any, coefficient: Coefficient) -> Parameter:
+    def parameter(key: str, name: str, value: ArrayLike, coefficient: Coefficient) -> Parameter:
         value = np.asarray(value, dtype=float)
         varies = name in swept or not value.ndim
         return Parameter(
@@ -160,7 +165,7 @@ def names_of(effects: Sequence[Effect]) -> list[str]:
     ]
 
 
-def link_parameters(dynamics: Any) -> tuple[str, ...]:
+def link_parameters(dynamics: Dynamics) -> tuple[str, ...]:
     """Return the names of masses and inertias of all links, such as "panda_link3.mass": parameters if swept."""
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
@@ -169,7 +174,7 @@ def link_parameters(dynamics: Any) -> tuple[str, ...]:
 
 
 def sweepable_parameters(
-    dynamics: Any, effects: Iterable[Effect], controller: Controller | None
+    dynamics: Dynamics, effects: Iterable[Effect], controller: Controller | None
 ) -> tuple[Parameter, ...]:
     """Return the parameters that may be swept, including those of links and of the controller's models."""
     prefixed = [("", dynamics)]
@@ -188,12 +193,12 @@ def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
     return inertias
 
 
-Values = Mapping[Part, Mapping[str, Any]]
+Values = Mapping[Part, Mapping[str, Scalar]]  # by part and attribute, also symbols
 
 
-def split(parameters: Iterable[Parameter], values: Any) -> dict[Part, dict[str, Any]]:
+def split(parameters: Iterable[Parameter], values: Array) -> dict[Part, dict[str, Scalar]]:
     """Split values of parameters, row after row, into values by part and attribute."""
-    parts: dict[Part, dict[str, Any]] = {}
+    parts: dict[Part, dict[str, Scalar]] = {}
     start = 0
     for parameter in parameters:
         inputs = values[start : start + parameter.size]
@@ -213,7 +218,7 @@ def joined(parameters: Iterable[Parameter]) -> np.ndarray:
     )
 
 
-def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
+def described(robot: Described, values: Mapping[str, Scalar]) -> Numbered:
     """Return a robot with other gravity, payloads, armature, mass scale, and masses and inertias of links."""
     payloads = tuple(
         with_values(payload, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
@@ -234,11 +239,11 @@ def _literal(values: Any) -> Any:
     return tuple(map(_literal, values)) if np.ndim(values) else values
 
 
-def with_numbers(dynamics: Any, values: Mapping[str, Any]) -> Any:
+def with_numbers(dynamics: Dynamics, values: Mapping[str, Scalar]) -> Dynamics:
     """Return the robot of a dynamics with other numbers; the dynamics itself without any."""
     if not values:
         return dynamics
-    robot = getattr(dynamics, "robot", dynamics)
+    robot: Any = getattr(dynamics, "robot", dynamics)
     return Robot(robot.description, described(robot, values).edits)
 
 
@@ -249,7 +254,9 @@ def rows(parameters: Iterable[Parameter], name: str) -> np.ndarray:
     return np.array([np.arange(a, a + parameter.size) for parameter, a in pairs if parameter.name == name])
 
 
-def with_parameters(plant: Plant, controller: Controller | None, new_values: Mapping[str, Any]) -> tuple[Plant, Any]:
+def with_parameters(
+    plant: Plant, controller: Controller | None, new_values: Mapping[str, Array]
+) -> tuple[Plant, Controller | None]:
     """Return a plant and its controller with other values of parameters, each (size,) by name; not checked here."""
     declared_parameters = parameters(plant.dynamics, plant.effects, controller, new_values)
     values = joined(declared_parameters)
@@ -266,9 +273,11 @@ def with_parameters(plant: Plant, controller: Controller | None, new_values: Map
     return Plant(with_numbers(plant.dynamics, by_part.get(ROBOT, {})), effects), controller
 
 
-def over_runs(plant: Plant, controller: Controller | None, values: Mapping[str, Any]) -> tuple[tuple[Effect, ...], Any]:
+def over_runs(
+    plant: Plant, controller: Controller | None, values: Mapping[str, Array]
+) -> tuple[tuple[Effect, ...], Controller | None]:
     """Return effects and controller whose coefficients are arrays over runs, (B, size) by name; for reading only."""
-    by_part: dict[Part, dict[str, Any]] = {}
+    by_part: dict[Part, dict[str, Array]] = {}
     for parameter in parameters(plant.dynamics, plant.effects, controller):
         if parameter.name in values:
             by_part.setdefault(parameter.part, {})[parameter.key] = values[parameter.name]

@@ -13,9 +13,9 @@ from typing import Any, overload
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
-from robot_dyn.codegen.dynamics import CompiledDynamics
+from robot_dyn.codegen.dynamics import CompiledDynamics, name_of_dtype
 from robot_dyn.codegen.engine import Engine
 from robot_dyn.codegen.parameters import ROBOT, Parameter, joined, parameters, split
 from robot_dyn.codegen.self_check import SelfCheck
@@ -48,7 +48,7 @@ class CompiledPlant:
     dynamics: CompiledDynamics
     is_nan_allowed: bool = False
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return CompiledPlant, (self.plant, self.dynamics, self.is_nan_allowed)
 
     @cached_property
@@ -67,7 +67,7 @@ class CompiledPlant:
     def engine(self) -> Engine:
         """Kernels of the plant."""
 
-        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
+        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             rows = [[state[name][i] for name in PLANT[quantity].arguments] for i in range(len(state["t"]))]
             times = zip(state["t"], state["q"], state["v"], strict=True)
             effects = np.array(
@@ -114,15 +114,15 @@ class CompiledPlant:
         """Names of the n joints, in the order of q."""
         return self.dynamics.joint_names
 
-    def M(self, q: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+    def M(self, q: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> np.ndarray:
         """Return the mass matrix, (..., n, n); it does not depend on t."""
         return self._rigid.M(q, out=out)
 
-    def C(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+    def C(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> np.ndarray:
         """Return the Coriolis matrix, (..., n, n); it does not depend on t."""
         return self._rigid.C(q, v, out=out)
 
-    def N(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+    def N(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> np.ndarray:
         """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N].
 
         Args:
@@ -136,7 +136,7 @@ class CompiledPlant:
         """
         return self._ask("N", (self._any_time if t is None else t, q, v), out)
 
-    def torque(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
+    def torque(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> np.ndarray:
         """Return Σ τ_effect, (..., n); for arguments and errors, see `N`."""
         return self._ask("torque", (self._any_time if t is None else t, q, v), out)
 
@@ -148,7 +148,7 @@ class CompiledPlant:
         *,
         t: ArrayLike | None = None,
         out: np.ndarray | None = None,
-    ) -> Any:
+    ) -> np.ndarray:
         """Return the actuation τ = M a + C v + N for the acceleration a, (..., n)."""
         return self._ask("inverse_dynamics", (self._any_time if t is None else t, q, v, a), out)
 
@@ -160,11 +160,11 @@ class CompiledPlant:
         *,
         t: ArrayLike | None = None,
         out: np.ndarray | None = None,
-    ) -> Any:
+    ) -> np.ndarray:
         """Return the acceleration under the actuation u, (..., n)."""
         return self._ask("forward_dynamics", (self._any_time if t is None else t, q, v, u), out)
 
-    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> np.ndarray:
         if arguments[0].__class__ in _TIMES:
             y = np.empty(self.n, self.dynamics.dtype) if out is None else out
             if not self.engine.ones[quantity](*arguments, y):
@@ -245,13 +245,15 @@ class CompiledPlant:
 
 @overload
 def compiled(
-    robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+    robot_or_plant: Robot, *, dtype: DTypeLike = ..., threads: int | None = ..., cache: bool = ...
 ) -> CompiledDynamics: ...
 @overload
 def compiled(
-    robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+    robot_or_plant: Plant, *, dtype: DTypeLike = ..., threads: int | None = ..., cache: bool = ...
 ) -> CompiledPlant: ...
-def compiled(robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True) -> Any:
+def compiled(
+    robot_or_plant: Robot | Plant, *, dtype: DTypeLike = "float64", threads: int | None = 1, cache: bool = True
+) -> CompiledDynamics | CompiledPlant:
     """Compile a robot or a plant to machine code, for one state (n,) and batches (..., n).
 
     Args:
@@ -266,7 +268,8 @@ def compiled(robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None
     Raises:
         QueryError: If `robot_or_plant` is neither, or an option is not allowed.
     """
+    name = name_of_dtype(dtype)
     if not isinstance(robot_or_plant, Plant):
-        return CompiledDynamics(robot_or_plant, dtype, threads, cache)
+        return CompiledDynamics(robot_or_plant, name, threads, cache)
     robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
-    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))
+    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, name, threads, cache))

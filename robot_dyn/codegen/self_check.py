@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from robot_dyn.lagrange.scale import (
     scaled,
     solved_tolerance,
 )
+from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import Quantity
 
 STATES = 16
@@ -47,7 +48,7 @@ class SelfCheck:
         name: Name in messages.
     """
 
-    dynamics: Any
+    dynamics: Robot
     name: str
 
     def states(self) -> dict[str, np.ndarray]:

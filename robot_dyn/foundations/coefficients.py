@@ -21,7 +21,6 @@ from robot_dyn.foundations.errors import EffectError, RobotDynError, nearest, sh
 from robot_dyn.foundations.validate import instance, number, numbers, truth
 
 if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
     from numpy.typing import ArrayLike
 
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
@@ -30,7 +29,6 @@ _KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
 
 Owner = TypeVar("Owner")  # an effect, controller or reference
-Built = TypeVar("Built", bound="DataclassInstance")
 
 
 class Jointed(Protocol):
@@ -225,10 +223,11 @@ def _is_cached(kind: type, name: str) -> bool:
     return isinstance(getattr_static(kind, name, None), cached_property)
 
 
-def rebuilt(part: Built, values: Mapping[str, object]) -> Built:
+def rebuilt(part: Owner, values: Mapping[str, object]) -> Owner:
     """Return a copy of a part with other coefficients, constructed again and thus checked."""
     inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
-    return replace(part, **{name: value for name, value in values.items() if "." not in name}, **inside)
+    dataclass: Any = part
+    return replace(dataclass, **{name: value for name, value in values.items() if "." not in name}, **inside)
 
 
 def value_at(part: object, path: str) -> ArrayLike | None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 
@@ -119,15 +118,15 @@ def _halved(
             raise
 
 
-def into(out: Any, result: Any) -> Any:
+def into(out: np.ndarray | None, result: np.ndarray) -> np.ndarray:
     """Return the result, in `out` if that is an array; raise QueryError if it does not fit."""
     if out is None:
         return result
-    result = np.asarray(result)
-    if not isinstance(out, np.ndarray) or out.dtype != result.dtype or out.shape != result.shape:
+    array = np.asarray(result)
+    if not isinstance(out, np.ndarray) or out.dtype != array.dtype or out.shape != array.shape:
         got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else repr(out)
-        raise QueryError(f"out must be an array of {result.dtype} and shape {result.shape}, got {got}")
+        raise QueryError(f"out must be an array of {array.dtype} and shape {array.shape}, got {got}")
     if not out.flags.writeable:
         raise QueryError("out must be writable, got a read-only array")
-    out[...] = result
+    out[...] = array
     return out

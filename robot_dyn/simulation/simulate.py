@@ -11,6 +11,8 @@ from dataclasses import fields, replace
 from time import perf_counter
 from typing import Any, NamedTuple, Unpack, cast
 
+from numpy.typing import ArrayLike
+
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
@@ -42,19 +44,19 @@ from robot_dyn.simulation.setup.setup import Setup, check_record
 @takes_options
 def simulate(
     what: Setup | Plant | Dynamics,
-    q0: Any = None,
-    v0: Any = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
     *,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Trajectory:
-    """Run a plant or a robot from a start; or a setup, with the given options in place of those of the setup.
+    """Run a plant or a robot from a start, or a setup with other options.
 
     Args:
-        what: What to run.
+        what: A plant, a robot or a setup.
         q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
-        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
-        on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
+        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; by default 0, or that of the setup.
+        on_progress: Called with the time reached, in [s], at each step, and with the time of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, method, step_s,
             record_every_s, estimate_error, about, engine, events and accuracy. `rtol` and `atol` are the tolerances of

@@ -372,7 +372,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "no 'kq'; nearest: k": {"params": {"kq": ones}},
         "no 'viscous_friction.visc'; nearest: viscous_friction.viscous": {"params": {"viscous_friction.visc": ones}},
         "kp must not be negative": {"params": {"kp": [-1.0]}},
-        r"no 'payload_mass:elbow': the arm carries no payload; add one, as robot.with_\(payload=": {
+        r"no 'payload_mass:elbow': the arm has no payload; add one with robot.with_\(payload=": {
             "params": {"payload_mass:elbow": ones}
         },
         "velocity_scale": {"params": {"regularised_coulomb_friction.velocity_scale": np.zeros(2)}},

@@ -269,7 +269,7 @@ def test_runs_that_cannot_be_shown_say_why(swing) -> None:
         ("no samples", arrays),
         ("contains no URDF", {"about": {}}),
         ("not those of its URDF", {"joint_names": ("a", "b")}),
-        ("edits in the run", {"about": swing.about | {"edits": json.dumps({"gravity": 1})}}),
+        ("edits in the run cannot be read", {"about": swing.about | {"edits": json.dumps({"gravity": 1})}}),
     ):
         with pytest.raises(rd.RobotDynError, match=why):
             rd.replay(replace(swing, **changes))

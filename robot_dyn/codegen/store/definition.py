@@ -58,7 +58,7 @@ class _UndefinedError(Exception):
     """A value without a definition was reached."""
 
 
-def definition(value: Any) -> str | None:
+def definition(value: object) -> str | None:
     """Return the SHA-256 of everything a value depends on; None if that may differ in another process."""
     reader = _Reader()
     try:
@@ -216,7 +216,7 @@ def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
 
 
 @lru_cache(maxsize=1024)
-def code_parts(code: CodeType) -> tuple[Any, ...]:
+def code_parts(code: CodeType) -> tuple[object, ...]:
     """Return everything that determines what a code object does, as strings and numbers, without file and lines."""
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
     counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount
@@ -224,7 +224,7 @@ def code_parts(code: CodeType) -> tuple[Any, ...]:
     return code.co_code.hex(), code.co_exceptiontable.hex(), names, counts, kind, [*map(_constant, code.co_consts)]
 
 
-def _constant(value: Any) -> Any:
+def _constant(value: object) -> tuple[object, ...]:
     if isinstance(value, CodeType):
         return code_parts(value)
     if isinstance(value, tuple | frozenset):

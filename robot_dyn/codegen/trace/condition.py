@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, final
+from typing import final
 
 import casadi as ca
 
@@ -43,10 +43,10 @@ class Condition:
     def __bool__(self) -> bool:
         return judging_regularity.get() or _decision.get()(self.node)
 
-    def __and__(self, other: Any) -> Condition:
+    def __and__(self, other: Condition | bool) -> Condition:
         return Condition(ca.logic_and(self.node, truth(other)))
 
-    def __or__(self, other: Any) -> Condition:
+    def __or__(self, other: Condition | bool) -> Condition:
         return Condition(ca.logic_or(self.node, truth(other)))
 
     def __invert__(self) -> Condition:
@@ -55,6 +55,6 @@ class Condition:
     __rand__, __ror__ = __and__, __or__
 
 
-def truth(condition: Any) -> Node:
+def truth(condition: Condition | bool) -> Node:
     """Return the node of a condition, or 0 or 1 for a plain truth value."""
     return condition.node if isinstance(condition, Condition) else ca.SX(bool(condition))

@@ -45,7 +45,7 @@ class Symbol:
             return self.node if self.sign > 0 else -self.node
         return self.constant + self.node if self.sign > 0 else self.constant - self.node
 
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Symbol | float) -> Symbol:
         if (x := _symbol(other)) is None:
             return NotImplemented
         c = self.constant + x.constant
@@ -67,13 +67,13 @@ class Symbol:
     def __pos__(self) -> Symbol:
         return self
 
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: Symbol | float) -> Symbol:
         return NotImplemented if (x := _symbol(other)) is None else self + -x
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: Symbol | float) -> Symbol:
         return -self + other
 
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Symbol | float) -> Symbol:
         if (x := _symbol(other)) is None:
             return NotImplemented
         if x.node is None:
@@ -95,7 +95,7 @@ class Symbol:
             return Symbol(self.constant * k)
         return Symbol(self.constant * k, self.sign * sign, self.node if size == 1 else size * self.node)
 
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Symbol | float) -> Symbol:
         if (x := _symbol(other)) is None:
             return NotImplemented
         if x.node is None:
@@ -104,10 +104,10 @@ class Symbol:
             return ZERO
         return Symbol(0.0, 1, self.expression / x.expression)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: Symbol | float) -> Symbol:
         return NotImplemented if (x := _symbol(other)) is None else x / self
 
-    def __pow__(self, exponent: Any) -> Symbol:
+    def __pow__(self, exponent: Symbol | float) -> Symbol:
         if (x := _symbol(exponent)) is None:
             return NotImplemented
         if x.node is not None:
@@ -151,16 +151,16 @@ class Symbol:
             return Symbol(float(exact(self.constant)))
         return _simplified(0.0, 1, symbolic(self.expression))
 
-    def __lt__(self, other: Any) -> Any:
+    def __lt__(self, other: Symbol | float) -> Condition | bool:
         return _compared(self, other, ca.lt)
 
-    def __le__(self, other: Any) -> Any:
+    def __le__(self, other: Symbol | float) -> Condition | bool:
         return _compared(self, other, ca.le)
 
-    def __gt__(self, other: Any) -> Any:
+    def __gt__(self, other: Symbol | float) -> Condition | bool:
         return _compared(self, other, ca.gt)
 
-    def __ge__(self, other: Any) -> Any:
+    def __ge__(self, other: Symbol | float) -> Condition | bool:
         return _compared(self, other, ca.ge)
 
     def __eq__(self, other: object) -> Any:
@@ -175,7 +175,7 @@ class Symbol:
 ZERO = Symbol(0.0)
 
 
-def select(condition: Any, yes: Any, no: Any) -> Symbol:
+def select(condition: Condition | bool, yes: Symbol | float, no: Symbol | float) -> Symbol:
     """Return `yes` where the condition holds, else `no`."""
     yes, no = symbol(yes), symbol(no)
     if not isinstance(condition, Condition):
@@ -183,7 +183,7 @@ def select(condition: Any, yes: Any, no: Any) -> Symbol:
     return _simplified(0.0, 1, ca.if_else(condition.node, yes.expression, no.expression))
 
 
-def symbol(x: Any) -> Symbol:
+def symbol(x: object) -> Symbol:
     """Convert a number or symbol to a symbol; raise TypeError if it is not a number."""
     if (converted := _symbol(x)) is None:
         raise TypeError(f"not a number: {x!r}")

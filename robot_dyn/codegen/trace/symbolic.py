@@ -6,7 +6,7 @@ outcomes and joins the results: x = if_else(c₁, if_else(c₂, x₁₁, x₁₀
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, final
@@ -16,7 +16,7 @@ import numpy as np
 
 from robot_dyn.codegen.trace.condition import Condition, Node, deciding, truth
 from robot_dyn.codegen.trace.symbol import Symbol, node, select, symbol
-from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Numeral
 from robot_dyn.foundations.errors import TraceError
 
 _MOST_BRANCHES = 64  # each is a copy of the function in the kernel
@@ -29,13 +29,13 @@ class Symbolic(Arithmetic):
 
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
 
-    def number(self, literal: Any) -> Symbol:
+    def number(self, literal: Symbol | Numeral) -> Symbol:
         return literal if isinstance(literal, Symbol) else Symbol(float(literal))
 
     def scope(self) -> AbstractContextManager[None]:
         return deciding(lambda condition: True)
 
-    def asarray(self, values: Any) -> Array:
+    def asarray(self, values: object) -> Array:
         return self.array(values)
 
     def finite(self, x: Array) -> np.ndarray:
@@ -46,17 +46,31 @@ class Symbolic(Arithmetic):
 class Symbols(np.ndarray):
     """An object array of symbols on which min, max, where and comparisons work as on numbers."""
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(
+        self, ufunc: np.ufunc, method: str, *inputs: object, out: tuple[object, ...] | None = None, **options: object
+    ) -> object:
         plain = [np.asarray(x) if isinstance(x, Symbols) else x for x in inputs]
-        if options.get("out") is not None:
-            options["out"] = tuple(np.asarray(x) if isinstance(x, Symbols) else x for x in options["out"])
+        if out is not None:
+            options["out"] = tuple(np.asarray(x) if isinstance(x, Symbols) else x for x in out)
         if ufunc in _OF_SYMBOLS:
             function, arguments = _OF_SYMBOLS[ufunc]
             with np.errstate(all="ignore"):  # NumPy reads processor flags that CasADi leaves set
                 return _symbols(getattr(np.frompyfunc(function, arguments, 1), method)(*plain, **options))
         return _symbols(getattr(ufunc, method)(*plain, **options))
 
-    def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
+    def __array_function__(
+        self,
+        function: Callable[..., object],
+        kinds: Iterable[type],
+        args: Iterable[object],
+        options: Mapping[str, object],
+    ) -> object:
+        return self._called(function, kinds, tuple(args), options)
+
+    def _called(
+        self, function: Any, kinds: Iterable[type], args: tuple[Any, ...], options: Mapping[str, Any]
+    ) -> object:
+        """Return the result of one of NumPy's functions."""
         if function is np.where and len(args) == 3:
             return _symbols(np.frompyfunc(select, 3, 1)(*(np.asarray(x) for x in args)))
         if function is np.clip and len(args) == 3 and not options and args[1] is not None is not args[2]:
@@ -120,7 +134,7 @@ def inputs(name: str, n: int) -> tuple[Node, Array]:
     return vector, array
 
 
-def column(array: Any) -> Node:
+def column(array: object) -> Node:
     """Return the entries of an array, row by row, as one CasADi column."""
     return ca.vertcat(*(symbol(x).expression for x in np.asarray(array, dtype=object).flat))
 

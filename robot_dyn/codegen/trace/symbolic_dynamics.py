@@ -12,6 +12,7 @@ import numpy as np
 from robot_dyn.codegen.parameters import Parameter, described, split
 from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, array_of, column, inputs
 from robot_dyn.codegen.trace.trace import Trace, Traced
+from robot_dyn.foundations.arithmetic import Scalar
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -46,7 +47,7 @@ class SymbolicDynamics(Dynamics[Symbols]):
         """Arithmetic of all numbers."""
         return self._trace.arithmetic
 
-    def of(self, values: Mapping[str, Any]) -> SymbolicDynamics:
+    def of(self, values: Mapping[str, Scalar]) -> SymbolicDynamics:
         """Return a copy whose inputs have these values."""
         if not values:
             return self

@@ -12,7 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import CONTROLLER, Part
+from robot_dyn.codegen.parameters import CONTROLLER, Values
 from robot_dyn.codegen.trace.symbolic import Symbol, Symbols, TraceError, column, every_branch
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial, polynomial
@@ -20,9 +20,10 @@ from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Mode, SetValued
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import QueryError, because
+from robot_dyn.queries.dynamics import Dynamics
 
 _INTERPRETED = "use the plant itself, or simulate it"
 REMEDY = "write it with robot_dyn.foundations.arithmetic and NumPy's operators, or use engine='interpreted'"
@@ -33,7 +34,7 @@ _ARM_INSIDE_A_LAW = (
 )
 
 
-def symbolic_plant(plant: Plant, bodies: Any, values: Mapping[Part, Mapping[str, Array]] | None = None) -> Plant:
+def symbolic_plant(plant: Plant, bodies: Dynamics, values: Values | None = None) -> Plant:
     """Return the same plant in symbols.
 
     Args:
@@ -46,7 +47,7 @@ def symbolic_plant(plant: Plant, bodies: Any, values: Mapping[Part, Mapping[str,
 
 
 def symbolic_controller(
-    controller: Controller, models: Mapping[str, Any], values: Mapping[Part, Mapping[str, Array]], pieces: Sequence[Any]
+    controller: Controller, models: Mapping[str, Dynamics], values: Values, pieces: Sequence[Piece]
 ) -> Controller:
     """Return the same controller in symbols.
 
@@ -70,12 +71,12 @@ def symbolic_controller(
     return TracedController(with_values(controller, parts), controller)
 
 
-def wide(x: Any, n: int) -> np.ndarray:
+def wide(x: object, n: int) -> np.ndarray:
     """Broadcast a number, or (n,), to symbols (n,)."""
     return np.broadcast_to(np.asarray(x, dtype=object), (n,)).view(Symbols)
 
 
-def whichever_way(name: str, function: Callable[[], Any], of_arm_inside: str = _ARM_INSIDE) -> Any:
+def whichever_way(name: str, function: Callable[[], Array], of_arm_inside: str = _ARM_INSIDE) -> Symbols:
     """Return the result of a part for every outcome of its comparisons; TraceError names the part.
 
     `of_arm_inside` is the remedy if the part uses a robot that it does not declare.
@@ -97,12 +98,12 @@ class Piece:
     def __init__(self, p: Array, n: int) -> None:
         self.start, self.coefficients = p[0], p[1:].reshape(-1, n).view(Symbols)
 
-    def at(self, t: Any) -> tuple[Array, Array, Array]:
+    def at(self, t: Symbol) -> tuple[Array, Array, Array]:
         """Return position, velocity and acceleration."""
         return polynomial(self.coefficients, t - self.start)
 
 
-def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
+def _traced(effect: Effect, values: Mapping[str, Scalar]) -> Effect:
     if isinstance(effect, CarriedPayload):
         if effect.carried is None:
             raise TraceError(f"effect {effect.name} is temporary: use plant.at(t), t in [s], or simulate the plant")
@@ -142,7 +143,7 @@ class _Part:
     def __init__(self, inner: Any) -> None:
         self.inner = inner
 
-    def traced(self, function: Callable[[], Any], length: int) -> Array:
+    def traced(self, function: Callable[[], object], length: int) -> Array:
         """Return a result as symbols (length,)."""
         return whichever_way(f"effect {self.name}", lambda: wide(function(), length))
 
@@ -224,7 +225,7 @@ class _StatefulBound(_States, _TracedBound):
 class TracedController(Controller):
     """A traced controller."""
 
-    def __init__(self, inner: Any, original: Controller) -> None:
+    def __init__(self, inner: Controller, original: Controller) -> None:
         self.inner, self.original, self.period_s = inner, original, original.period_s
 
     @cached_property
@@ -240,6 +241,6 @@ class TracedController(Controller):
     torque, demand = (_method(name, lambda t, q, v, z: len(v)) for name in ("torque", "demand"))
     state_rate, next_state = (_method(name, lambda t, q, v, z: len(z)) for name in ("state_rate", "next_state"))
 
-    def traced(self, function: Callable[[], Any], length: int) -> Array:
+    def traced(self, function: Callable[[], object], length: int) -> Array:
         """Return a result as symbols (length,)."""
         return whichever_way(f"controller {self.original.name}", lambda: wide(function(), length), _ARM_INSIDE_A_LAW)

@@ -224,7 +224,7 @@ def _places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) -
     """Return where the parameters of effects have the mode; the first parameter is at place `first`."""
     at: dict[str, list[int]] = {name: [] for name in _MODE}
     for each in known:
-        if each.part[0] == "effect" and isinstance(effects[each.part[1]], SetValued) and each.key in at:
+        if each.part[0] == "effect" and isinstance(effects[int(each.part[1])], SetValued) and each.key in at:
             at[each.key].append(first)
         first += each.size
     return Places(*(np.array(each, np.int64) for each in at.values()))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def write_run(run: TrajectoryData, path: Path) -> Path:
     return run_format(type(run)).save(replace(run, about=packed(run.about, path.parent)), path)
 
 
-def version_remedy(about: Mapping[str, Any]) -> str:
+def version_remedy(about: Mapping[str, object]) -> str:
     """Return the remedy for a run file of another format, from its JSON."""
     value = about.get("value", about)  # in formats up to 6 the texts are outside
     texts = value.get("about") if isinstance(value, dict) else None

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Protocol, final, runtime_checkable
+from typing import Protocol, final, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.effects.causes import Causes
 from robot_dyn.foundations.display import MOST_JOINTS, curves, plot
@@ -28,7 +29,7 @@ class Theorem(Protocol):
 
     joint_names: tuple[str, ...]
 
-    def contains(self, t: float, q: Any, v: Any = None) -> bool:
+    def contains(self, t: float, q: ArrayLike, v: ArrayLike | None = None) -> bool:
         """Return True if the enclosure at t contains a state."""
         ...
 

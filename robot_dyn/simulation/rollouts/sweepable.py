@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from robot_dyn.codegen.parameters import sweepable_parameters, with_parameters
+from robot_dyn.codegen.parameters import Parameter, sweepable_parameters, with_parameters
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
@@ -27,9 +28,9 @@ class SweptParameter(Value):
 
     Attributes:
         name: Its key in `params` of `rollouts`.
-        value: That of the setup.
-        unit: Of a joint that turns, and of one that slides where its unit differs; empty if it has none.
-        shape: Of its values over B runs, as "(B,) or (B, 6)".
+        value: Its value in the setup.
+        unit: Unit for a revolute joint, and for a prismatic joint if that differs; empty if it has none.
+        shape: Shape of its values over B runs, for example "(B,) or (B, 6)".
     """
 
     name: str
@@ -47,22 +48,22 @@ class Sweepable(Answer):
     """The parameters of a setup that `rollouts` can sweep.
 
     Attributes:
-        parameters: In the order of robot, effects, controller and its models.
+        parameters: Parameters in the order of robot, effects, controller and its models.
     """
 
     parameters: tuple[SweptParameter, ...]
 
     def blocks(self) -> Iterator[Block]:
         yield "parameters that rd.rollouts(setup, params={name: values}) can sweep over B runs:"
-        rows = ((each.name, _shown(each.value), each.unit, each.shape) for each in self.parameters)
+        rows = ((x.name, _shown(x.value), x.unit, x.shape) for x in self.parameters)
         yield Table(("name", "value", "unit", "values"), tuple(rows))
 
 
 def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
-    """The parameters that `rollouts` can sweep: names, values, units and shapes.
+    """Return the parameters that `rollouts` can sweep: names, values, units and shapes.
 
     They are coefficients of effects, gains of the controller, gravity, payloads, armature, the factor on all masses,
-    mass and inertia of each link, and the same of the controller's models. Its `repr` is the table that
+    mass and inertia of each link, and the same for the controller's models. Its `repr` is the table that
     `robot-dyn sweepable` prints, `to_json()` the document of its `--json`.
 
     Args:
@@ -74,23 +75,23 @@ def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
     setup = what if isinstance(what, Setup) else None
     plant = setup.plant if setup is not None else what if isinstance(what, Plant) else Plant(what)  # pyright: ignore[reportArgumentType]
     controller = None if setup is None else setup.controller
-    known = sweepable_parameters(plant.dynamics, plant.effects, controller)
-    found = {each.name: swept_parameter(each, plant.dynamics) for each in reversed(known)}
-    return Sweepable(tuple(found.values())[::-1])
+    parameters = sweepable_parameters(plant.dynamics, plant.effects, controller)
+    by_name = {parameter.name: swept_parameter(parameter, plant.dynamics) for parameter in reversed(parameters)}
+    return Sweepable(tuple(by_name.values())[::-1])
 
 
-def swept_parameter(known: Any, dynamics: Any) -> SweptParameter:
-    """A parameter as `robot_dyn.codegen.parameters` has it, with its unit."""
+def swept_parameter(parameter: Parameter, dynamics: Dynamics | None) -> SweptParameter:
+    """Return a parameter of `robot_dyn.codegen.parameters` with its unit."""
     types = joint_types_of(dynamics)
-    of_joints, size = known.declared.of_joints, known.value.size
-    signal = SIGNALS.get(known.name.partition(".")[0], SIGNAL)
-    unit = coefficient_unit(replace(known.declared, unit=known.declared.unit.replace(SIGNAL, signal)), types)
-    shape = f"(B,) or (B, {size})" if of_joints else f"(B{''.join(f', {n}' for n in known.value.shape)})"
-    return SweptParameter(known.name, known.value, unit, shape.replace("(B)", "(B,)"))
+    of_joints, value = parameter.declared.of_joints, parameter.value
+    signal = SIGNALS.get(parameter.name.partition(".")[0], SIGNAL)
+    unit = coefficient_unit(replace(parameter.declared, unit=parameter.declared.unit.replace(SIGNAL, signal)), types)
+    shape = f"(B,) or (B, {value.size})" if of_joints else f"(B{''.join(f', {n}' for n in value.shape)})"
+    return SweptParameter(parameter.name, value, unit, shape.replace("(B)", "(B,)"))
 
 
 def _shown(value: np.ndarray) -> str:
-    """One number, all of them where they differ, or the diagonal of a matrix."""
+    """Return one number, all numbers if they differ, or the diagonal of a matrix."""
     if value.ndim == 2:
         return f"diagonal {', '.join(f'{x:g}' for x in value.diagonal())}"
     if value.ndim == 1 and value.size > 1 and (value == value[0]).all():
@@ -98,8 +99,8 @@ def _shown(value: np.ndarray) -> str:
     return ", ".join(f"{x:g}" for x in value.flat)
 
 
-def parts_of_run(setup: Setup, values: Mapping[str, Any], number: int) -> tuple[Plant, Controller | None]:
-    """Plant and controller of the run of this number, with its values by name and its noise."""
+def parts_of_run(setup: Setup, values: Mapping[str, ArrayLike], number: int) -> tuple[Plant, Controller | None]:
+    """Return plant and controller of the run with this number, with its values by name and its noise."""
     plant, controller = setup.plant, setup.controller
     if values:
         plant, controller = with_parameters(plant, controller, values)

@@ -239,7 +239,7 @@ def gain_limit(setup: Setup, seed: int, budget: Budget) -> Limit:
         within = f"stable up to ω = {_RANGE[1]:g} rad/s" if limit.value else f"unstable from ω = {_RANGE[0]:g} rad/s on"
         return replace(limit, within=within)
     both = [_sampled(setup, part * limit.value) for part in (_WITHIN, _BEYOND)]
-    loop = linearised(both[1].plant, both[1].controller, 0.0, y)
+    loop = linearised(both[1].plant, _law(both[1]), 0.0, y)
     start = _pushed(both[0], loop.matrix(_PERIOD_S), seed)
     setups = tuple(replace(sampled, q0=start.q0, v0=start.v0) for sampled in both)
     limit = replace(limit, state={"q": at.tolist()}, setups=setups)
@@ -256,10 +256,16 @@ def gain_limit(setup: Setup, seed: int, budget: Budget) -> Limit:
 
 def _sampled(setup: Setup, omega: float) -> Setup:
     """Return the setup under a sampled PD of another frequency."""
-    law = setup.controller
+    law = _law(setup)
     inertia = law.kd**2 / (4 * law.kp)
     sampled = PDGravity(law.model, law.reference, inertia * omega**2, 2 * inertia * omega, _PERIOD_S)
     return replace(setup, controller=sampled)
+
+
+def _law(setup: Setup) -> PDGravity:
+    """Return the controller that `held` gave a setup."""
+    assert isinstance(setup.controller, PDGravity)
+    return setup.controller
 
 
 def _largest_frequency(setup: Setup, y: np.ndarray, budget: Budget) -> float:
@@ -268,7 +274,7 @@ def _largest_frequency(setup: Setup, y: np.ndarray, budget: Budget) -> float:
     def stable(omega: float) -> bool:
         budget.check()
         try:
-            loop = linearised(setup.plant, _sampled(setup, omega).controller, 0.0, y)
+            loop = linearised(setup.plant, _law(_sampled(setup, omega)), 0.0, y)
             return loop.growth(_PERIOD_S).verdict is not Stability.UNSTABLE
         except np.linalg.LinAlgError:  # the matrix is not finite
             return False

@@ -58,12 +58,14 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
     for _ in range(_DRAWS):
         drawn, step = _method(rng)
         try:
-            setup = Setup(plant, q, v, duration, control, drawn, record_every_s=record, **step)
+            setup = Setup(
+                plant, q, v, duration_s=duration, controller=control, method=drawn, record_every_s=record, **step
+            )
         except RobotDynError:  # not every method supports every effect
             continue
-        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.method.rtol:.0e}"
+        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {drawn.rtol:.0e}"
         return setup, f"{family}: {setup.method.name}{steps}"
-    return Setup(plant, q, v, duration, control), f"{family}: auto"
+    return Setup(plant, q, v, duration_s=duration, controller=control), f"{family}: auto"
 
 
 def _effects(robot: Robot, family: str, q: np.ndarray, scale: np.ndarray, rng: np.random.Generator) -> list[Effect]:

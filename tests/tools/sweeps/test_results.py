@@ -296,7 +296,7 @@ WRONG: dict[str, dict[str, Any]] = {
     "'q0.0.' is the name of another column": {"figures": {"q0[0]": sw.rms_tracking_error()}},
     "needs a joint": {"figures": {"mine": sw.final("q")}},
     "no joint 'elbow'; known: joint_1, joint_2": {"figures": {"mine": sw.peak("u", "elbow")}},
-    "the arm carries no payload": {"vary": {"payload_mass:tool0": sw.uniform(low=0, high=3)}},
+    "the arm has no payload": {"vary": {"payload_mass:tool0": sw.uniform(low=0, high=3)}},
     "no 'kq'; ": {"vary": {"kq": sw.uniform(low=0, high=3)}},
     "q0 has 2 numbers, got a distribution of 1": {"vary": {"q0": sw.uniform(low=0, high=3)}},
     "nothing varies": {"vary": {}},

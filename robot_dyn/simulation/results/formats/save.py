@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar, final
+from typing import TypeVar, final
 
 from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import FileKind, file_path, save, target
-from robot_dyn.simulation.columns import EXTRA, Column
+from robot_dyn.simulation.columns import EXTRA
 from robot_dyn.simulation.results.formats import mcap_log, tables
 from robot_dyn.simulation.results.run_data import RunData, TrajectoryData
 from robot_dyn.simulation.results.run_file import RUN, RunFileError
@@ -24,12 +24,12 @@ class Format:
 
     Attributes:
         kind: Kind of the files.
-        write: Function that writes a run and its columns to a stream.
+        write: Function of a run, its columns and a stream.
         packages: Packages that `write` needs.
     """
 
     kind: FileKind
-    write: Callable[[Any, list[Column], BinaryIO], object]
+    write: Callable[..., object]
     packages: tuple[str, ...] = ()
 
 
