@@ -76,13 +76,13 @@ class RightSide(NamedTuple):
     Attributes:
         rate: y', (r, W).
         jacobian: ∂f/∂y_j in out[j] and ∂f/∂t in out[m], (m + 1, m, W); 0 unless the method needs it.
-        step, behind: Of a method for velocities that jump; 0 for others. See `time_stepping`.
+        step, after_step: Of a method for velocities that jump; 0 for others. See `time_stepping`.
     """
 
     rate: Any
     jacobian: Any = 0
     step: Any = 0
-    behind: Any = 0
+    after_step: Any = 0
 
 
 class States(NamedTuple):

@@ -87,7 +87,7 @@ def time_step(f: RightSide, rows: Problem, work: Work, t: Any, h: Any, x: States
             alone = True
             x.failed[b] = 0 if solved_alone(rows, work, out[m:], b) else 1
     if alone:
-        evaluate(f.behind, t, work.y[: m + 1], x.p, out[m:], work.again)
+        evaluate(f.after_step, t, work.y[: m + 1], x.p, out[m:], work.again)
         for b in range(y.shape[1]):
             if out[m + rows.changed, b] > 0.0:
                 for e in range(m):

@@ -147,7 +147,7 @@ class Halved(Block):
     ("effects", "block", "said"),
     [
         ([Bare(2.0)], None, "may change its attribute 'c' in a run: make it a frozen dataclass"),
-        ([Remembers()], None, "may change what its attribute 'memory' holds"),
+        ([Remembers()], None, "may change the content of its attribute 'memory'"),
         ((), Halved(), "does not declare whether its output jumps: define rounds"),
         ([Cached()], None, ""),
     ],

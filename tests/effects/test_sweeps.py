@@ -39,7 +39,7 @@ POINTS = [[0.8, 0.2, 0.3], [0.6, 0.1, 1.0]]
 CASES = [
     ([rd.effects.DahlFriction(STIFFNESS, LEVEL, 1.5)], (SLIDER, [0.0], None, 0.5, beats),
      {"dahl_friction.exponent": [1.2, 2.0]}),
-    (STATES, ON_ARM, {"actuator_lag.time_constant": [[0.05, 0.02], [0.01, 0.08]]}),
+    (STATES, ON_ARM, {"actuator_lag.time_constant_s": [[0.05, 0.02], [0.01, 0.08]]}),
     (STATES, ON_ARM, {"lugre_friction.bristle_stiffness": [120.0, 60.0]}),
     (DRIVE, driven(0.005), STIFFNESSES),
     ([BETWEEN], ON_TREE, STRUT),

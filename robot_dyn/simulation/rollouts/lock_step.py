@@ -157,9 +157,7 @@ class Tiles:
             columns=np.empty((1 + 3 * n, 0)),
             observation=self.observations[tile],
         )
-        config = loop_config(
-            equation,
-            alone=False,
+        config = loop_config(equation, alone=False)._replace(
             largest=LARGEST,
             base=lanes.start,
             apart=self.apart,

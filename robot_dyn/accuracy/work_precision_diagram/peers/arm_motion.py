@@ -159,10 +159,10 @@ def desired_motion(of: PiecewisePolynomial) -> Callable[[float], np.ndarray]:
     ends = of.breaks[1:-1]
 
     def at(t: float) -> np.ndarray:
-        inside = min(max(t, of.start), of.end)
+        inside = min(max(t, of.start_s), of.end_s)
         piece = int(np.searchsorted(ends, inside, side="right")) if len(ends) else 0
         s = inside - of.breaks[piece]
-        rate = powers * s**lower if of.start <= t <= of.end else 0.0 * powers
+        rate = powers * s**lower if of.start_s <= t <= of.end_s else 0.0 * powers
         return np.array([s**powers, rate]) @ of.coefficients[piece]
 
     return at

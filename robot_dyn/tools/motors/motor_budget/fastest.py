@@ -39,7 +39,7 @@ class FastestMotion(Answer):
     """The path of a motion at its limits.
 
     Attributes:
-        before: Duration of the original motion, in [s].
+        before_s: Duration of the original motion, in [s].
         strokes: Number of movements from stop to stop.
         distance: Largest distance from the path, in [rad] or [m].
         slowed: Factor λ on the duration that satisfies continuous torques; 1 if it is not needed, or no λ suffices.
@@ -50,7 +50,7 @@ class FastestMotion(Answer):
         plan: The motion.
     """
 
-    before: float
+    before_s: float
     strokes: int
     distance: float
     slowed: float
@@ -61,9 +61,9 @@ class FastestMotion(Answer):
     plan: Plan = field(metadata=UNREPORTED)
 
     @reported
-    def duration(self) -> float:
+    def duration_s(self) -> float:
         """Return the duration of the motion, in [s]."""
-        return self.plan.duration
+        return self.plan.duration_s
 
     def blocks(self) -> Iterator[Block]:
         _, *rest = self.plan.blocks()
@@ -72,7 +72,7 @@ class FastestMotion(Answer):
             yield f"found no faster motion along the path that fits{share}; the original motion, which fits:"
         else:
             stops = "without a stop" if self.strokes == 1 else f"in {self.strokes} strokes, with the same pauses"
-            times = f"{self.duration:.4g} s instead of {self.before:.4g} s"
+            times = f"{self.duration_s:.4g} s instead of {self.before_s:.4g} s"
             yield f"the same path in {times}{share}, {stops}, within {self.distance:.1g} rad or m of it:"
         yield from rest
         if self.slowed > 1:
@@ -101,13 +101,13 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, share)
     bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": limits.continuous}
-    before, pace = motion.end - motion.start, least_pace(plan.reference, plant, limits.continuous)
+    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, limits.continuous)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
     new_budget = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
-    result = {"before": before, "strokes": strokes, "share": share}
-    if _fits(motor_budget, share) and (not new_budget.fits or plan.duration >= before):
+    result = {"before_s": before, "strokes": strokes, "share": share}
+    if _fits(motor_budget, share) and (not new_budget.fits or plan.duration_s >= before):
         plan = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
         return FastestMotion(**result, distance=0.0, slowed=1.0, no_pace="", given=True, budget=motor_budget, plan=plan)
     slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, new_budget))
@@ -136,7 +136,7 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: f
     strokes = _strokes(motion)
     if not strokes:
         raise PlanError("the motion is at rest throughout, so it has no path; give a motion that moves")
-    q, since, off = motion.at(np.array([motion.start]))[0][0], motion.start, 0.0
+    q, since, off = motion.at(np.array([motion.start_s]))[0][0], motion.start_s, 0.0
     parts, findings = list[PiecewisePolynomial | None](), dict[str, None]()
     bounds = {"effort": limits.effort, "velocity": limits.velocity, "acceleration": limits.acceleration}
     for start, end in strokes:
@@ -149,7 +149,7 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: f
         parts += [_pause(q, start - since), stroke.reference]
         off, since, q = max(off, _distance(points, way, places)), end, points[-1]
         findings |= dict.fromkeys(stroke.findings)
-    parts.append(_pause(q, motion.end - since))
+    parts.append(_pause(q, motion.end_s - since))
     robot: Any = plant.dynamics
     by_kind = {"velocity": limits.velocity, "torque": limits.effort * share}
     kinds, how = (robot.name, robot.joint_names, robot.joint_types), "the same path at its limits"
@@ -158,7 +158,7 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: f
 
 def _strokes(motion: PiecewisePolynomial) -> list[tuple[float, float]]:
     """Return start and end of each movement from stop to stop, in [s]."""
-    t = np.unique(np.concatenate([motion.breaks, np.linspace(motion.start, motion.end, _TIMES)]))
+    t = np.unique(np.concatenate([motion.breaks, np.linspace(motion.start_s, motion.end_s, _TIMES)]))
     v = motion.at(t)[1]
     largest = np.abs(v).max(axis=0)
     v = v / np.where(largest > 0, largest, 1.0)
@@ -194,7 +194,7 @@ def _way(motion: PiecewisePolynomial, start: float, end: float) -> tuple[np.ndar
 def _distance(points: np.ndarray, way: np.ndarray, places: np.ndarray) -> float:
     """Return the largest distance of the spline through points from the path, in [rad] or [m]."""
     spline = through(points)
-    q, slope, _ = spline.at(way / way[-1] * spline.end)
+    q, slope, _ = spline.at(way / way[-1] * spline.end_s)
     along = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     off = q - places
     return float(np.abs(off - np.sum(off * along, axis=1, keepdims=True) * along).max())

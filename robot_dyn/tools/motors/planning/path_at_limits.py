@@ -115,7 +115,7 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
         motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
-        judgement = judged(plant, limits, motion, judged_times(motion.end))
+        judgement = judged(plant, limits, motion, judged_times(motion.end_s))
         largest = float(judgement.most.max())
         if largest <= _REFUSED and error <= _ERROR:
             return motion, judgement
@@ -130,14 +130,14 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
     """Return the motion, and the error of its linearised effects as a share of the effort limits."""
     fixed = _apart(path.breaks, turning_points(path)) if plant.forces else path.breaks
     cosine = (1 - np.cos(np.linspace(0, np.pi, _CELLS + 1))) / 2
-    grid = _merged(fixed, path.start + (path.end - path.start) * cosine)
+    grid = _merged(fixed, path.breaks[0] + (path.breaks[-1] - path.breaks[0]) * cosine)
     duration = cells(plant, limits, path, grid, None).expected_duration
-    last = Speed(path.breaks[[0, -1]], np.full(2, ((path.end - path.start) / duration) ** 2))
-    motion, error = hold(path.at(path.start)[0]), inf
+    last = Speed(path.breaks[[0, -1]], np.full(2, ((path.breaks[-1] - path.breaks[0]) / duration) ** 2))
+    motion, error = hold(path.at(path.breaks[0])[0]), inf
     for turn in range(_ROUNDS):
         last, error = _solved(plant, limits, path, grid, last, duration)
         motion = in_time(path, last.s, last.x)
-        duration = motion.end
+        duration = motion.end_s
         if turn == 0:  # change to pieces of about the same duration
             grid = _merged(fixed, _places(last, motion.breaks, np.linspace(0, duration, _CELLS + 1)))
             continue
@@ -176,7 +176,7 @@ def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tup
     most = most.reshape(len(h), -1)
     at_limits = (h[:, None] * (most >= BINDS)).mean(axis=-1).sum() / h.sum()
     above = most.max(axis=-1) > _ABOVE
-    bad = (above | (most.min(axis=-1) < BINDS)) & (h > _SHORTEST * motion.end)
+    bad = (above | (most.min(axis=-1) < BINDS)) & (h > _SHORTEST * motion.end_s)
     return bad, bool(at_limits >= _AT_LIMITS and not above.any())
 
 

@@ -77,9 +77,9 @@ class PathPlan(Answer, Value):
         return self.plan.reference
 
     @property
-    def duration(self) -> float:
+    def duration_s(self) -> float:
         """Duration of the motion, in [s]."""
-        return self.plan.duration
+        return self.plan.duration_s
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ class PathPlan(Answer, Value):
         return self.plan.findings
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.plan.arm}: {self.plan.method}: {self.duration:.6g} s from rest to rest"
+        yield f"{self.plan.arm}: {self.plan.method}: {self.duration_s:.6g} s from rest to rest"
         yield f"at a limit for {self.at_limits:.2%} of the time; largest share of a limit {self.largest:.5f}"
         yield from (f"elsewhere, {part:.2%}: {why}" for why, part in self.elsewhere.items())
         rows = tuple((x.joint, x.kind, x.limit, x.largest, f"{x.binds:.1%}") for x in self.bindings)
@@ -96,7 +96,9 @@ class PathPlan(Answer, Value):
 
     @property
     def drawing(self) -> str:
-        return plot("torque, as a share of its limit,", judged_times(self.duration), self.ratios) + legend(self.ratios)
+        return plot("torque, as a share of its limit,", judged_times(self.duration_s), self.ratios) + legend(
+            self.ratios
+        )
 
 
 @final
