@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 78,
+    "opening": 77,
     "as of": 20,
     "what without noun": 98,
     "is told": 2,

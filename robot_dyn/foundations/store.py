@@ -31,6 +31,7 @@ _MOST = 20  # largest ratio of unpacked to packed bytes: zeros would have 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
+Other = TypeVar("Other")
 Axis = int | str | None  # length of an axis: a number; a letter for one length in a file; None for any length
 
 
@@ -161,6 +162,20 @@ class StoredFormat(Generic[Stored]):
         except (StoreError, TypeError, ValueError) as error:
             raise self.error(f"{path}: cannot be written: {error}; save a value as the library returns it") from None
 
+    def load(self, path: str | Path, *others: StoredFormat[Other]) -> Stored | Other:
+        """Return the value of a file in this format, or in another format of the same kind of file.
+
+        Raises:
+            RobotDynError: Of type `error`, if the file is missing, damaged, cut short or of an unknown format.
+        """
+        with reading(path, self.error, self.remedy) as stream:
+            try:
+                arrays = _read_arrays(stream)
+                name = _about(dict(arrays))["format"]
+                return next((form for form in others if form.name == name), self).value(arrays)
+            except StoreError as error:
+                raise self.error(f"{path}: cannot be read as {self.kind.name}: {error}; {self.remedy}") from None
+
     def value(self, arrays: dict[str, np.ndarray]) -> Stored:
         """Return the checked value of arrays; the array `about` contains the JSON.
 
@@ -187,23 +202,6 @@ class StoredFormat(Generic[Stored]):
             raise StoreError(f"member {shorten(min(arrays))!r} is unknown to this version")
         self.check(value, members)
         return value
-
-
-def load_one_of(path: str | Path, *formats: StoredFormat[Any]) -> Any:
-    """Return the value of a file in one of several formats, of one kind of file.
-
-    Raises:
-        RobotDynError: Of type `error` of the first format, if the file is missing, damaged, cut short or of another
-            format.
-    """
-    first = formats[0]
-    with reading(path, first.error, first.remedy) as stream:
-        try:
-            arrays = _read_arrays(stream)
-            name = _about(dict(arrays))["format"]
-            return next((form for form in formats if form.name == name), first).value(arrays)
-        except StoreError as error:
-            raise first.error(f"{path}: cannot be read as {first.kind.name}: {error}; {first.remedy}") from None
 
 
 def _about(arrays: dict[str, np.ndarray]) -> dict[str, Any]:

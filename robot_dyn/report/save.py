@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from robot_dyn.foundations import files
 from robot_dyn.foundations.result import json_text
@@ -29,7 +29,7 @@ class Saved(Protocol):
     diagram: ClassVar[str]
 
     @property
-    def rows(self) -> Iterable[Mapping[str, Any]]:
+    def rows(self) -> Iterable[Mapping[str, object]]:
         """Rows of the table."""
         ...
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from robot_dyn.foundations.files import file_path, read_start
-from robot_dyn.foundations.store import load_one_of
 from robot_dyn.simulation.results.provenance import unpacked
 from robot_dyn.simulation.results.run_file import REMEDY, RUN, RunFileError, run_format
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -41,5 +40,5 @@ def read(path: str | Path) -> Trajectory | Rollouts:
     reader = _OTHER_READERS.get(path.suffix.lower())
     if reader and read_start(path, len(RUN.start), RunFileError, REMEDY) != RUN.start:
         raise RunFileError(f"{path}: is not a run file (.npz); {reader}")
-    run = load_one_of(path, run_format(Trajectory), rollouts_format(Rollouts))
+    run = run_format(Trajectory).load(path, rollouts_format(Rollouts))
     return replace(run, about=unpacked(run.about, path))
