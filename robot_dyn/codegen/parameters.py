@@ -255,7 +255,7 @@ def rows(parameters: Iterable[Parameter], name: str) -> np.ndarray:
 
 
 def with_parameters(
-    plant: Plant, controller: Controller | None, new_values: Mapping[str, Array]
+    plant: Plant, controller: Controller | None, new_values: Mapping[str, ArrayLike]
 ) -> tuple[Plant, Controller | None]:
     """Return a plant and its controller with other values of parameters, each (size,) by name; not checked here."""
     declared_parameters = parameters(plant.dynamics, plant.effects, controller, new_values)

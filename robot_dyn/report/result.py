@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
@@ -40,7 +40,7 @@ class Result(Answer):
         raise NotImplementedError
 
     @property
-    def rows(self) -> Iterable[Mapping[str, Any]]:
+    def rows(self) -> Iterable[Mapping[str, object]]:
         """Rows of the table, values by column."""
         return ()
 

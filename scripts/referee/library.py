@@ -191,8 +191,8 @@ def setup(
     """Return the setup of a run; `engine` is "compiled", "interpreted" or "auto"."""
     options = {"method": by} if by is not None else {}
     return rd.Setup(
-        plant, q0, v0, duration, controller=controller, step_s=step, record_every_s=record, estimate_error=estimate,
-        engine=engine, events=events, accuracy=accuracy, **options,
+        plant, q0, v0, duration_s=duration, controller=controller, step_s=step, record_every_s=record,
+        estimate_error=estimate, engine=engine, events=events, accuracy=accuracy, **options,
     )  # fmt: skip
 
 
