@@ -26,10 +26,10 @@ from robot_dyn.scene.scene import read_scene as read_scene
 from robot_dyn.simulation.dynamics.event import Event as Event
 from robot_dyn.simulation.dynamics.linearise import linearise as linearise
 from robot_dyn.simulation.results.trajectory import Trajectory as Trajectory
+from robot_dyn.simulation.rollouts.parameters import parameters as parameters
 from robot_dyn.simulation.rollouts.read import read as read
 from robot_dyn.simulation.rollouts.result import Rollouts as Rollouts
 from robot_dyn.simulation.rollouts.rollouts import rollouts as rollouts
-from robot_dyn.simulation.rollouts.sweepable import sweepable as sweepable
 from robot_dyn.simulation.setup.setup import Setup as Setup
 from robot_dyn.simulation.simulate import simulate as simulate
 from robot_dyn.view.plots.plots import plot as plot

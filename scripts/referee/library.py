@@ -250,10 +250,10 @@ def run_values(run: Any) -> tuple[Values, Texts]:
 
 
 def rollouts(
-    of: Any, q0: Any, v0: Any = None, params: Mapping[str, Any] | None = None, record: Sequence[str] = ("q", "v")
+    of: Any, q0: Any, v0: Any = None, vary: Mapping[str, Any] | None = None, record: Sequence[str] = ("q", "v")
 ) -> Any:
     """Run a batch on one thread."""
-    return rd.rollouts(of, q0, v0, params=params, record=tuple(record), threads=1)
+    return rd.rollouts(of, q0, v0, vary=vary, record=tuple(record), threads=1)
 
 
 def rollouts_values(runs: Any) -> tuple[Values, Texts]:

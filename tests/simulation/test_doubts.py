@@ -21,8 +21,7 @@ def coarse() -> rd.Trajectory:
 
 def test_every_kind_has_a_sentence_of_its_facts() -> None:
     assert set(_SENTENCES) == set(DoubtKind)
-    for kind, (text, remedy) in _SENTENCES.items():
-        parts = [part for parts in (text, remedy) for part in parts]
+    for kind, parts in _SENTENCES.items():
         formats = [form for part in parts for form in ((part,) if isinstance(part, str) else part)]
         names = {name for form in formats for _, name, _, _ in Formatter().parse(form) if name}
         numbers = {name: spec for form in formats for _, name, spec, _ in Formatter().parse(form) if name}

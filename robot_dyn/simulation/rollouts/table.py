@@ -14,8 +14,8 @@ from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.results.samples import root_mean_squares
 from robot_dyn.simulation.results.table import Types, of_joints
 from robot_dyn.simulation.rollouts.overview import texts_by_run
+from robot_dyn.simulation.rollouts.parameters import setup_parameter
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
-from robot_dyn.simulation.rollouts.sweepable import swept_parameter
 
 
 def columns(runs: RolloutsData, overview: Overview) -> Iterator[Column]:
@@ -64,12 +64,12 @@ def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
     """Yield the varied parameters: by joint if the setup declares them so, otherwise numbered if there are several."""
     setup = runs.setup
     varied = (
-        () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.params)
+        () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.varied)
     )
     declared = {parameter.name: parameter.declared for parameter in varied if parameter.declared.of_joints}
     dynamics = None if setup is None else setup.plant.dynamics
-    about = {parameter.name: swept_parameter(parameter, dynamics).unit for parameter in varied}
-    for name, values in runs.params.items():
+    about = {parameter.name: setup_parameter(parameter, dynamics).unit for parameter in varied}
+    for name, values in runs.varied.items():
         columns = values.T
         if name in declared and len(columns) == len(types):
             for (joint, kind), x in zip(types.items(), columns, strict=True):
