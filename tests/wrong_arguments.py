@@ -119,7 +119,7 @@ def examples(folder: Path) -> dict[str, Example]:
         replace(setup, engine="interpreted"), methods=["RK4"], budget_s=2.0, repeats=1
     )
     priced = rd.accuracy.cost(setup, budget_s=1e-9, repeats=1)
-    saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
+    saved, scene, urdf = run.save(folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
     of_sweep = folder / "of_sweep.toml"
@@ -224,7 +224,13 @@ def examples(folder: Path) -> dict[str, Example]:
             on_progress=lambda part, what: None),
         call(rd.accuracy.warn_below, robot=robot, digits=12.0),
         call(certified.of, quantity="M", implementation="Pinocchio"),
-        call(rd.accuracy.save_result, result=certified, path=folder / "digits.csv", theme="dark"),
+        call(certified.save, path=folder / "digits.csv", theme="dark"),
+        call(priced.save, path=folder / "cost.csv", theme="dark"),
+        call(measured.save, path=folder / "work.csv", theme="dark"),
+        call(needs.save, path=folder / "budget.csv", theme="dark"),
+        call(rd.diff_runs(several[0], several[0]).save, path=folder / "difference.csv", theme="dark"),
+        call(rd.tools.stress.stress(robot, samples=100, runs=0, budget_s=1e-3).save, path=folder / "stress.json",
+            theme="dark"),
         call(rd.tools.stress.stress, robot=robot, samples=100, runs=0, seed=3, budget_s=1e-3, on_progress=lambda
             spent, what: None),
         call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
@@ -248,10 +254,9 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.list_robots),
         call(rd.load, name_or_path=urdf, package_dirs=[folder], xacro=None, inertia="stated", mass=None,
             total_mass=None, density=None, allow_overlap=False, download=False, without=()),
-        call(rd.load_run, path=saved),
+        call(rd.read, path=saved),
         call(rd.diff_runs, a=several[0], b=several[0]),
-        call(rd.export, run=several, path=folder / "table"),
-        call(rd.load_rollouts, path=rd.save_rollouts(several, folder / "all")),
+        call(several.save, path=folder / "table.csv"),
         call(rd.integrate.method, name="RK4"),
         call(rd.accuracy.midpoint, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
@@ -274,14 +279,13 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),
-        call(swept.export, path=folder / "rows.csv", force=True),
+        call(swept.save, path=folder / "rows.csv", force=True),
         call(swept.mean, figure="end", level=0.9, given="finished"),
         call(swept.probability, event="end > 0.1", level=0.9, given="finished"),
         call(swept.quantiles, figure="end", probabilities=[0.5], level=0.9),
         call(swept.reasons),
         call(swept.run, i=3),
         call(swept.setup_of, i=3),
-        call(swept.save_report, path=folder / "report.html", force=True),
         call(swept.sensitivity, figure="end", level=0.9, given="finished"),
         call(swept.verify),
         call(swept.worst, figure="end", count=2, given="finished"),
@@ -294,16 +298,13 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.sweeps.lognormal, median=1.0, sigma_of_log=0.1),
         call(rd.tools.sweeps.normal, mean=1.0, sd=0.1),
         call(rd.tools.sweeps.peak, of_what="v", joint="slide"),
-        call(rd.tools.sweeps.read, folder=folder / "sweep", scene=of_sweep, figures={}),
+        call(rd.tools.sweeps.read_sweep, folder=folder / "sweep", scene=of_sweep, figures={}),
         call(rd.tools.sweeps.rms_tracking_error, joint="slide"),
         call(rd.tools.sweeps.run, sweep=swept.sweep, folder=folder / "sweep", threads=1, chunk=16,
             on_progress=print_nothing),
         call(rd.tools.sweeps.triangular, low=0.0, mode=0.5, high=1.0),
         call(rd.tools.sweeps.uniform, low=0.0, high=1.0),
-        call(rd.save_plot, run=run, path=folder / "plot.png", dpi=50.0, joints=["hinge"]),
-        call(rd.save_replay, run=run, path=folder / "page", package_dirs=[folder], frame="pole", inertia=True),
-        call(rd.save_rollouts, runs=several, path=folder / "many"),
-        call(rd.save_run, trajectory=run, path=folder / "again"),
+        call(run.save, path=folder / "again"),
         call(rd.show, robot=robot, q=q, package_dirs=[folder], inertia=False),
         call(rd.simulate, what=plant, on_progress=lambda t: None, q0=q, duration_s=0.01),
         call(rd.control.task_dynamics, dynamics=robot, q=q, v=v, frame="pole", rows=(0,), threshold=0.01),

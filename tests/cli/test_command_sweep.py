@@ -23,7 +23,7 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
     )  # fmt: skip
     assert said.returncode == 0, said.stderr
     assert "96 finished, 0 diverged, 0 raised" in said.stdout and "probability of worst > 0.001" in said.stdout
-    assert sw.read(out).sweep.samples == sw.samples("q", "u", every=48)
+    assert sw.read_sweep(out).sweep.samples == sw.samples("q", "u", every=48)
     again = command.run("sweep", "run", str(out), "--json", "--probability", "failed")
     found = json.loads(again.stdout)
     assert found.keys() == promised("sweep SCENE").keys()

@@ -105,7 +105,7 @@ def budget(
 def _run(path: str) -> Trajectory:
     """Return the run of a file, or simulate a scene."""
     if path.lower().endswith(".npz"):
-        return rd.load_run(path)
+        return arguments.run(path)
     setup = rd.read_scene(path)
     with bar(setup.duration_s) as advance:
         return rd.simulate(setup, on_progress=advance)

@@ -81,7 +81,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: give the folder of a sweep, robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene, figures)
+        result = sw.read_sweep(folder, scene, figures)
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
@@ -89,9 +89,7 @@ def sweep(
             verified += [f"{count} chunks by {name}" for name, count in result.processors.items()]
         elif what in ("report", "export"):
             path = Path(output or f"{folder.rstrip('/')}.{'html' if what == 'report' else 'csv'}")
-            write = result.save_report if what == "report" else result.export
-            written = write(path, force=force)
-            to_stderr(f"written: {written}")
+            to_stderr(f"written: {result.save(path, force=force)}")
     answers = [result.probability(event) for event in probability or ()] if not result.status["missing"] else []
     if as_json:
         say_json(result, probabilities=dict(zip(probability or (), answers, strict=False)))

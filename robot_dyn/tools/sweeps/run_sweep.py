@@ -1,4 +1,4 @@
-"""`run` fills the folder of a sweep by threads, a cluster or a job of an array, or resumes it; `read` opens it.
+"""`run` fills the folder of a sweep by threads, a cluster or a job of an array, or resumes it; `read_sweep` opens it.
 
 A new folder begins with a pilot of 64 runs, which determines the size of chunks: about 2 s of work, constant from then
 on. The pilot measures processor time, because wall time on a busy machine would lead to small chunks.
@@ -68,7 +68,7 @@ def run(
     Raises:
         SweepError: If an argument is invalid, the folder contains another sweep, or a file cannot be written.
     """
-    instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read(folder).sweep", error=SweepError)
+    instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read_sweep(folder).sweep", error=SweepError)
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
     path, (number, jobs), work = file_path(folder, SweepError), share_of(job), Work(sweep)
     count = thread_count(threads)
@@ -108,7 +108,7 @@ def run(
     return SweepResult(sweep, store)
 
 
-def read(
+def read_sweep(
     folder: str | Path, scene: str | Path | Callable[..., Any] | None = None, figures: Mapping[str, Any] | None = None
 ) -> SweepResult:
     """Return the result in the folder of a sweep.

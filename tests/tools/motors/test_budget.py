@@ -498,7 +498,7 @@ def test_the_command_takes_columns_by_name(files: Path) -> None:
 
 
 def test_the_command_takes_scenes_and_runs_and_writes_figure_and_table(files: Path) -> None:
-    run = rd.save_run(rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05), files / "run")
+    run = rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05).save(files / "run")
     (files / "scene.toml").write_text('robot = "simple_pendulum"\nduration_s = 0.05\n[start]\nq = [0.4]\n')
     for what in (run, files / "scene.toml"):
         assert ran("budget", what).returncode == 0

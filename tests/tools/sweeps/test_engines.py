@@ -78,7 +78,7 @@ def test_completeness_is_asked_of_the_folder(filled: Any) -> None:
     client.forgets = lambda chunk: chunk in (3, 7) and client.submitted.count(chunk) < 3
     fill(client, folder)
     assert sorted(client.submitted) == sorted([*range(10), 3, 3, 7, 7])
-    assert sw.read(folder.path).verify() == expected
+    assert sw.read_sweep(folder.path).verify() == expected
     assert names_in(folder.path) == ["design", "rows", "sweep.json"]  # tokens are gone
 
 
