@@ -37,7 +37,7 @@ def motion(name: str) -> rd.Trajectory:
     more = dict.fromkeys(names[len(start) :], 0.5)  # fingers
     arm = arm.with_(lock=lock | more) if lock or more else arm
     q0 = np.array(start)
-    kp, kd = rd.control.gains_from(1.0, frequency=15.0)
+    kp, kd = rd.control.gains_from(1.0, bandwidth_rad_s=15.0)
     control = rd.control.ComputedTorque(arm.with_(mass_scale=1.2), rd.control.quintic(q0, q0 + way, 1.5), kp, kd)
     return rd.simulate(rd.Plant(arm, "urdf"), q0=q0, duration_s=2.0, controller=control, record_every_s=0.005)
 
@@ -68,7 +68,7 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         for name in list(ARMS)[: 1 if quick else None]:
             run = motion(name)
-            page = rd.save_replay(run, Path(pages) / f"{name}.html")
+            page = rd.replay(run).save(Path(pages) / f"{name}.html")
             photograph(browser, page, folder / f"{name}.png", t=0.8)
             print(f"{folder / name}.png: {run.outcome.ending}, page of {page.stat().st_size / 1e6:.1f} MB")
         browser.close()

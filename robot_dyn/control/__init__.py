@@ -1,6 +1,6 @@
 """Torque from a reference and a measured state: each controller owns its model of the arm and never sees the plant.
 
-    joint by joint     PD, PID; gains_from: gains from a frequency and a damping ratio
+    joint by joint     PD, PID; gains_from: gains from a bandwidth and a damping ratio
     with a model       ComputedTorque, PDGravity, FeedForward
     of a frame         OperationalSpace; task_dynamics (TaskDynamics), orientation_error, rotation_vector
     a function         ControlLaw: (t, q, v) as a controller

@@ -83,9 +83,9 @@ class PID(Controller):
     ki: Any = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
     kd: Any = field(metadata=DAMPING)
     effort_limit: Any = field(default=np.inf, metadata=coefficient("N m", above=0, infinite=True))
-    tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, swept=False))
+    tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, can_vary=False))
     period_s: float = 0.0
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
+    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -138,14 +138,14 @@ class PID(Controller):
         return saturated(u, self.effort_limit, self._middle)
 
 
-def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def gains_from(inertia_diagonal: Any, bandwidth_rad_s: Any, damping_ratio: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Compute gains for the closed loop ë + 2 ζ ω ė + ω² e = 0 of a joint: kp = M_ii ω², kd = 2 ζ ω M_ii.
 
     For computed torque, which cancels the inertia, pass inertia 1.
 
     Args:
         inertia_diagonal: M_ii, a scalar or (n,), in [kg m²] or [kg], positive.
-        frequency: ω, a scalar or (n,), in [rad/s], positive.
+        bandwidth_rad_s: ω, the natural frequency, a scalar or (n,), in [rad/s], positive.
         damping_ratio: ζ, a scalar or (n,), 1 for critical damping, not negative.
 
     Raises:
@@ -153,12 +153,14 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
 
     Source: Siciliano et al. 2009, sec. 8.3.1.
     """
-    arguments = {"inertia_diagonal": inertia_diagonal, "frequency": frequency, "damping_ratio": damping_ratio}
+    arguments = {
+        "inertia_diagonal": inertia_diagonal, "bandwidth_rad_s": bandwidth_rad_s, "damping_ratio": damping_ratio,
+    }  # fmt: skip
     inertia, omega, zeta = (numbers(name, x, (), ("n",), least=0) for name, x in arguments.items())
     if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
         raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
     if not ((inertia > 0).all() and (omega > 0).all()):
-        raise ControlError(f"inertia_diagonal and frequency must be positive, got {inertia} and {omega}")
+        raise ControlError(f"inertia_diagonal and bandwidth_rad_s must be positive, got {inertia} and {omega}")
     with np.errstate(over="ignore"):
         kp, kd = inertia * omega**2, 2 * zeta * omega * inertia
     return numbers("kp = M_ii ω²", kp, (), ("n",)), numbers("kd = 2 ζ ω M_ii", kd, (), ("n",))

@@ -48,9 +48,9 @@ class Plan(Answer, Value):
         read_only(self)
 
     @reported
-    def duration(self) -> float:
+    def duration_s(self) -> float:
         """Return the time from the first to the last break, in [s]."""
-        return self.reference.end - self.reference.start
+        return self.reference.end_s - self.reference.start_s
 
     @cached_property
     def peaks(self) -> dict[str, np.ndarray]:
@@ -59,9 +59,9 @@ class Plan(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.arm}: {self.method}"
-        after = f" from {self.reference.start:g} s" if self.reference.start else ""
-        yield f"{self.duration:.6g} s{after}, {len(self.reference.coefficients)} polynomials"
-        start, end = self.reference.at(np.array([self.reference.start, self.reference.end]))[0]
+        after = f" from {self.reference.start_s:g} s" if self.reference.start_s else ""
+        yield f"{self.duration_s:.6g} s{after}, {len(self.reference.coefficients)} polynomials"
+        start, end = self.reference.at(np.array([self.reference.start_s, self.reference.end_s]))[0]
         shown = [name for name in _ORDERS if name in self.limits or name != "jerk"]
         columns = [self._cells(name) for name in shown]
         units = [of_joint("rad", kind) for kind in self.joint_types]

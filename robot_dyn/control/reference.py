@@ -67,7 +67,7 @@ class PiecewisePolynomial(Reference):
     def __repr__(self) -> str:
         pieces, terms, n = self.coefficients.shape
         kind = f"{pieces} polynomial{'s' * (pieces != 1)} of degree {terms - 1}"
-        return f"<{type(self).__name__}: {n} joint{'s' * (n != 1)}, {kind}, {self.start:g} to {self.end:g} s>"
+        return f"<{type(self).__name__}: {n} joint{'s' * (n != 1)}, {kind}, {self.start_s:g} to {self.end_s:g} s>"
 
     @property
     def n(self) -> int:
@@ -84,12 +84,12 @@ class PiecewisePolynomial(Reference):
         return {"": self}
 
     @property
-    def start(self) -> float:
+    def start_s(self) -> float:
         """Time of the first break, in [s]."""
         return float(self.breaks[0])
 
     @property
-    def end(self) -> float:
+    def end_s(self) -> float:
         """Time of the last break, in [s]."""
         return float(self.breaks[-1])
 

@@ -37,7 +37,7 @@ class EffortLimit(Bound):
         metadata=coefficient("N m", symbol="u_max", least=0, infinite=True, elsewhere=inf, stated="effort_limit")
     )
 
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
+    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
 
     term = "|u| ≤ u_max"
     largest = property(attrgetter("limit"))  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -71,13 +71,13 @@ class ActuatorLag(Stateful, Bound):
     Bounds listed before it in a plant act on the command, bounds listed after it on u.
 
     Attributes:
-        time_constant: T, a scalar or (n,), in [s], positive.
+        time_constant_s: T, a scalar or (n,), in [s], positive.
 
     Example:
-        >>> rd.effects.ActuatorLag(time_constant=[0.02, 0.05])
+        >>> rd.effects.ActuatorLag(time_constant_s=[0.02, 0.05])
     """
 
-    time_constant: Any = field(metadata=coefficient("s", symbol="T", above=0))
+    time_constant_s: Any = field(metadata=coefficient("s", symbol="T", above=0))
 
     term = "u' = (u_command − u) / T"
     thresholds = smooth
@@ -86,7 +86,7 @@ class ActuatorLag(Stateful, Bound):
         return n
 
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
-        return (u - z) / self.time_constant
+        return (u - z) / self.time_constant_s
 
     def actuation(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
         self, u: Array, z: Array

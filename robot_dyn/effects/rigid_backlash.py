@@ -34,28 +34,29 @@ class RigidBacklash(GearedMotor, SetValued):
     the arm is neglected.
 
     Attributes:
-        gap: β, to each side, a scalar or (n,), in [rad] or [m], not negative; joints of gap 0 are driven directly.
+        half_gap: β, half of the play, a scalar or (n,), in [rad] or [m], not negative; a data sheet usually states the
+            play, 2β. Joints of half gap 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
         ratio: n of the gear; 1 by default.
         restitution: e, a scalar or (n,), 0 to 1; 0 by default.
         viscous: b of the motor at the output of the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
 
     Example:
-        >>> rd.effects.RigidBacklash(gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
+        >>> rd.effects.RigidBacklash(half_gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
     """
 
-    gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))
+    half_gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))
     inertia: Any = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
     ratio: Any = field(default=None, metadata=coefficient(symbol="n", above=0, elsewhere=1.0))
     restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
     viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
-    _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
 
     coupled: ClassVar[bool] = True
-    through = "gap"
+    through = "half_gap"
     term = "|δ| ≤ β, δ = θ − q, δ̇⁺ = −e δ̇⁻, n² J θ̈ = u − b θ̇ within"
 
     def __post_init__(self) -> None:

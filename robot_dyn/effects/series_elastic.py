@@ -32,8 +32,8 @@ class SeriesElastic(GearedMotor, Dissipative):
 
     δ = θ − q is the deflection of the spring, θ the motor angle at the output of the gear. The states are δ of all
     driven joints, then θ̇. A run starts with relaxed springs, δ = 0, and motors that move with their joints. The
-    actuation u of a driven joint is the motor torque at the output of the gear, n times the torque of the rotor. With a
-    backlash β the spring exerts no torque while |δ| ≤ β; the damper still acts.
+    actuation u of a driven joint is the motor torque at the output of the gear, n times the torque of the rotor. With
+    a half gap β the spring exerts no torque while |δ| ≤ β; the damper still acts.
 
     In the energy ledger the control does its work on the motors; motors and springs store ½ n² J θ̇² + ½ k δ². The
     motion of the rotors with the arm is neglected.
@@ -44,11 +44,12 @@ class SeriesElastic(GearedMotor, Dissipative):
         ratio: n of the gear; 1 by default.
         damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 by default.
         viscous: b of the motor at the output of the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
-        backlash: β, to each side, in [rad] or [m], not negative; 0 by default.
+        half_gap: β, half of the play of the gear, in [rad] or [m], not negative; 0 by default. A data sheet usually
+            states the play, 2β.
 
     Example:
         >>> rd.effects.SeriesElastic(stiffness=[0.0, 80.0], inertia=0.02, ratio=5.0, damping=0.1, viscous=0.2,
-        ...     backlash=0.01)
+        ...     half_gap=0.01)
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
@@ -56,18 +57,18 @@ class SeriesElastic(GearedMotor, Dissipative):
     ratio: Any = field(default=None, metadata=coefficient(symbol="n", above=0, elsewhere=1.0))
     damping: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="d", least=0))
     viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
-    backlash: Any = field(default=None, metadata=coefficient("rad", symbol="β", least=0))
+    half_gap: Any = field(default=None, metadata=coefficient("rad", symbol="β", least=0))
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
-    _side: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    _side: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
 
     through = "stiffness"
     term = "k δ + d δ̇, n² J θ̈ = u − k δ − d δ̇ − b θ̇, δ = θ − q"
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        if self.backlash is None:
+        if self.half_gap is None:
             return ()
-        gaps = self.of("backlash", n)
+        gaps = self.of("half_gap", n)
         return tuple(
             Threshold(i, way * float(gaps[k]), *words, state=k)
             for way, words in ((1, _FORWARD), (-1, _BACKWARD))
@@ -76,7 +77,7 @@ class SeriesElastic(GearedMotor, Dissipative):
         )
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> SeriesElastic:
-        if self.backlash is None:
+        if self.half_gap is None:
             return self
         side = np.zeros(n)
         for threshold, passed in sides.items():
@@ -113,11 +114,11 @@ class SeriesElastic(GearedMotor, Dissipative):
         return (self.reflected(n) * self.speeds(z) ** 2 / 2 + k * self._stretch(n, z) ** 2 / 2).sum(axis=-1)
 
     def _stretch(self, n: int, z: Array) -> Array:
-        """Return the deflection of the springs, minus the backlash."""
+        """Return the deflection of the springs, minus the half gap."""
         deflection = z[..., : len(self._driven)]
-        if self.backlash is None:
+        if self.half_gap is None:
             return deflection
-        gap = self.of("backlash", n)
+        gap = self.of("half_gap", n)
         if self._side is None:
             return positive_part(deflection - gap) - positive_part(-gap - deflection)
         side = self.of("_side", n)

@@ -68,7 +68,7 @@ KINDS: dict[str, type[Controller]] = {
 
 
 class Control(Part):
-    """A controller, with gains kp and kd, or gains from the frequency ω and the damping ratio ζ of the closed loop.
+    """A controller, with gains kp and kd, or gains from the bandwidth ω and the damping ratio ζ of the closed loop.
 
     kp = ω² and kd = 2 ζ ω, times the diagonal of M at the start for `pd`, `pid`, `pd_gravity` and `feed_forward`.
     `operational_space` holds the posture of the start with a tenth of the largest kp.
@@ -76,8 +76,8 @@ class Control(Part):
 
     kind: Literal["pd", "pid", "pd_gravity", "feed_forward", "computed_torque", "operational_space"]
     """The control law."""
-    frequency_rad_per_s: PerJoint | None = None
-    """Frequency ω of the closed loop; required without kp and kd."""
+    bandwidth_rad_s: PerJoint | None = None
+    """Natural frequency ω of the closed loop; required without kp and kd."""
     damping_ratio: PerJoint = 1.0
     """Damping ratio ζ of the closed loop, 1 for critical damping."""
     kp: PerJoint | None = None
@@ -120,8 +120,8 @@ class Control(Part):
 
     @model_validator(mode="after")
     def _every_key_has_an_effect_and_gains_are_stated_once(self) -> Self:
-        if len({self.kp is None, self.kd is None, self.frequency_rad_per_s is not None}) > 1:
-            raise PydanticCustomError("wrong_key", "give frequency_rad_per_s, or both kp and kd")
+        if len({self.kp is None, self.kd is None, self.bandwidth_rad_s is not None}) > 1:
+            raise PydanticCustomError("wrong_key", "give bandwidth_rad_s, or both kp and kd")
         for key, reason in self.unused.items():
             if key in self.model_fields_set:
                 raise wrong_key(key, f"has no effect {reason}; remove it")
@@ -164,7 +164,7 @@ class Control(Part):
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Return stiffness and damping, as stated or from ω and ζ."""
-        names = ("kp", "kd") if self.kp is not None else ("frequency_rad_per_s", "damping_ratio")
+        names = ("kp", "kd") if self.kp is not None else ("bandwidth_rad_s", "damping_ratio")
         of_frame = self.kind == "operational_space"
         first, second = (
             numbers(f"control.{name}", getattr(self, name), (), ("n",), least=0)

@@ -19,6 +19,7 @@ from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Stated, 
 
 _SEVERAL = Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD
 _BY_KEYWORD = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
+_WHOLE = {"rad/s": "rad_s", "rad/s/s": "rad_s2", "m/s": "m_s"}  # units of speeds need no "per"
 _SPELLED = {" ": "_", "/": "_per_", "²": "2", "(": "", ")": ""}
 
 
@@ -137,6 +138,6 @@ def _keys_of(
 
 
 def _key(name: str, unit: str) -> str:
-    """Return a name with its unit, such as "viscous_N_m_s_per_rad"."""
-    spelled = "".join(_SPELLED.get(letter, letter) for letter in unit)
-    return f"{name}_{spelled}" if spelled else name
+    """Return a name with its unit, such as "viscous_N_m_s_per_rad"; unchanged if it ends with the unit."""
+    spelled = _WHOLE.get(unit) or "".join(_SPELLED.get(letter, letter) for letter in unit)
+    return name if not spelled or name.endswith(f"_{spelled}") else f"{name}_{spelled}"

@@ -11,6 +11,8 @@ from dataclasses import fields, replace
 from time import perf_counter
 from typing import Any, NamedTuple, Unpack, cast
 
+from numpy.typing import ArrayLike
+
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
@@ -42,19 +44,19 @@ from robot_dyn.simulation.setup.setup import Setup, check_record
 @takes_options
 def simulate(
     what: Setup | Plant | Dynamics,
-    q0: Any = None,
-    v0: Any = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
     *,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Trajectory:
-    """Run a plant or a robot from a start; or a setup, with the given options in place of those of the setup.
+    """Run a plant or a robot from a start, or a setup with other options.
 
     Args:
-        what: What to run.
+        what: A plant, a robot or a setup.
         q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
-        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
-        on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
+        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; by default 0, or that of the setup.
+        on_progress: Called with the time reached, in [s], at each step, and with the time of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, method, step_s,
             record_every_s, estimate_error, about, engine, events and accuracy. `rtol` and `atol` are the tolerances of
@@ -90,7 +92,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
     results = Results(
         ran.setup, recording, ran.observer, error, dict(setup.about), ran.engine.exact_right_angles, ran.remarks
     )
-    known: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         "joint_names": setup.plant.dynamics.joint_names,
         "t": recording.t,
         "events": recording.events,
@@ -98,8 +100,8 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         "accuracy": None,
     }
     if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # later reads are not allowed
-        later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
-        known |= {name: getattr(results, name) for name in later}
+        later = [field.name for field in fields(Trajectory) if field.name not in (*attributes, "statistics")]
+        attributes |= {name: getattr(results, name) for name in later}
     method = ran.setup.method
     statistics = Statistics(
         method=EXPLICIT if method.name == AUTO else method.name,
@@ -115,7 +117,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         companion_runs=runner.runs,
         user_code=", ".join(named(part) for part, _ in setup.undeclared),
     )
-    return derived(Trajectory, results, statistics=statistics, **known)
+    return derived(Trajectory, results, statistics=statistics, **attributes)
 
 
 class _Ran(NamedTuple):

@@ -61,7 +61,7 @@ def point_to_point(effort: Effort) -> None:
             t = rng.uniform(0, its.duration, 100)
             expected = np.array([its.at_time(x)[:3] for x in t]).swapaxes(0, 1)
             off = [np.abs(x - y).max() for x, y in zip(plan.reference.at(t), expected, strict=True)]
-            worst = np.maximum(worst, [*off, abs(plan.duration - its.duration)])
+            worst = np.maximum(worst, [*off, abs(plan.duration_s - its.duration)])
         row(name, motions, *(f"{x:.1e}" for x in worst))
 
 
@@ -109,7 +109,7 @@ def _judged(plant: rd.Plant, points: np.ndarray) -> tuple[float, ...]:
     began = perf_counter()
     found = rd.tools.motors.path(plant, points)
     seconds = perf_counter() - began
-    q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
+    q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration_s / 10_000)
     torque = np.abs(robot.inverse_dynamics(q, v, a) - plant.torque(q, v, t=0.0)) / robot.effort_limit
     speed = np.abs(v) / robot.velocity_limit
     at_limit = (np.maximum(torque.max(axis=1), speed.max(axis=1)) >= 0.99).mean()

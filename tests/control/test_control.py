@@ -158,7 +158,7 @@ ROBOT = rd.load("planar_2r")
         (lambda: PID(MOTION, 1.0, 1.0, 1.0, tracking_time_s=0.0), "tracking_time_s must be positive"),
         (lambda: ComputedTorque(ROBOT, MOTION, 1.0, 1.0), "the model has 2 joints, but the reference has 3"),
         (lambda: FeedForward(ROBOT, hold([0.0, 0.0]), 1.0, [1.0]), r"kd must be one number or of shape \(2,\)"),
-        (lambda: gains_from(0.0, 1.0), "inertia_diagonal and frequency must be positive"),
+        (lambda: gains_from(0.0, 1.0), "inertia_diagonal and bandwidth_rad_s must be positive"),
         (lambda: PD(MOTION, 1.0, 1.0, period_s=[]), r"period_s must be one number, got shape \(0,\)"),
         (lambda: gains_from([1.0, 2.0], [1.0, 2.0, 3.0]), "shapes do not match"),
     ],

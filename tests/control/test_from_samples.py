@@ -38,7 +38,7 @@ def test_the_motion_passes_through_the_samples_with_four_continuous_derivatives(
         left, right = derivatives(c[k], h[k]), derivatives(c[k + 1], 0.0)
         for r in range(5):  # rounding grows by 1/h = 40 with each derivative
             np.testing.assert_allclose(left[r], right[r], atol=1e-12 * 40**r)
-    assert plan.findings == () and plan.duration == 2.0
+    assert plan.findings == () and plan.duration_s == 2.0
 
 
 def test_ends_at_rest_have_neither_velocity_nor_acceleration() -> None:
@@ -86,14 +86,14 @@ def test_arrays_tables_frames_and_files_in_any_unit_are_one_motion(tmp_path: Pat
         scale = 40.0 ** np.arange(6)[:, None]  # of rounding in a coefficient of tʲ
         np.testing.assert_allclose(plan.reference.coefficients / scale, expected / scale, atol=1e-12)
     stamps = pandas.DataFrame({"t": pandas.to_datetime(1.7e9 + T, unit="s")} | table(SMOOTH) | {"t": T})
-    assert read(stamps, start_s=3.0).reference.start == 3.0
+    assert read(stamps, start_s=3.0).reference.start_s == 3.0
 
 
 def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
     """Its q, v and a are met at the samples, exactly."""
     arm = rd.load("planar_2r")
     run = rd.simulate(arm, q0=[0.3, 0.4], duration_s=0.5)
-    plan = rd.control.from_samples(arm, rd.export(run, tmp_path / "run.csv"), ends="measured")
+    plan = rd.control.from_samples(arm, run.save(tmp_path / "run.csv"), ends="measured")
     for mine, its in zip(plan.reference.at(run.t), (run.q, run.v, run.a), strict=True):
         np.testing.assert_allclose(mine, its, atol=1e-9)
     assert np.abs(rd.control.from_samples(arm, tmp_path / "run.csv", ends="rest").reference.at(0.0)[1]).max() < 1e-10
@@ -105,7 +105,7 @@ def test_samples_that_move_at_an_end_need_a_word() -> None:
         rd.control.from_samples(ARM, table(SMOOTH))
     with pytest.raises(PlanError, match=r"at the end of the samples: choose"):
         rd.control.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
-    assert rd.control.from_samples(ARM, REST[::20], time=T[::20]).duration == 2.0  # way points are few
+    assert rd.control.from_samples(ARM, REST[::20], time=T[::20]).duration_s == 2.0  # way points are few
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_joints_are_found_by_name_at_the_times_of_the_headers(tmp_path: Path) ->
     plan = rd.control.from_samples(ARM, write(tmp_path / "log.mcap", measured()))
     np.testing.assert_allclose(plan.reference.at(T)[0], REST, atol=1e-8)  # 1 ns at 1 rad/s, 9 digits of a stamp
     np.testing.assert_allclose(plan.reference.at(0.5 * (T[1:] + T[:-1]))[0], 0.5 * (REST[1:] + REST[:-1]), atol=1e-3)
-    assert plan.reference.start == 0 and plan.duration == pytest.approx(2.0, abs=1e-9) and plan.findings == ()
+    assert plan.reference.start_s == 0 and plan.duration_s == pytest.approx(2.0, abs=1e-9) and plan.findings == ()
     assert "topic /joint_states, times of headers, from 1700000000.123456789 s" in plan.method
 
 
@@ -109,7 +109,7 @@ def test_a_log_of_rd_export_is_read_back(tmp_path: Path) -> None:
     """Positions to the bit at its samples, by either topic."""
     controller = rd.control.PD(rd.control.quintic([0.1] * 6, [0.3] * 6, 0.3), 400.0, 40.0)
     run = rd.simulate(ARM, [0.1] * 6, duration_s=0.3, controller=controller)
-    path = rd.export(run, tmp_path / "run.mcap")
+    path = run.save(tmp_path / "run.mcap")
     assert run.desired is not None
     for topic, q in (("/joint_states", run.q), ("/desired/joint_states", run.desired)):
         plan = rd.control.from_samples(ARM, path, topic=topic, ends="rest")

@@ -190,11 +190,11 @@ def test_machine_code_and_rollouts_run_the_same_loop() -> None:
 def test_coefficients_of_blocks_are_swept_by_name() -> None:
     setup = rd.Setup(PLANT, Q0, V0, 10 * T, EVERYTHING, "RK4", T / 4, T, estimate_error=False)
     params = {
-        "position.quantisation.resolution": [1e-3, 4e-3], "velocity.low_pass.cutoff": [40.0, 20.0],
+        "position.quantisation.resolution": [1e-3, 4e-3], "velocity.low_pass.cutoff_rad_s": [40.0, 20.0],
         "actuation.rate_limit.rate": [300.0, 50.0], "position.noise.deviation": [1e-4, 0.0], "kp": [9.0, 50.0],
         "actuation.noise.deviation": [0.0, 0.1],
     }  # fmt: skip
-    many = rd.rollouts(setup, Q0, V0, params=params)
+    many = rd.rollouts(setup, Q0, V0, vary=params)
     for run in range(2):
         own = replace(
             EVERYTHING, controller=replace(EVERYTHING.controller, kp=params["kp"][run]), run=run,
@@ -209,8 +209,8 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
         )  # fmt: skip
         alone = rd.simulate(setup, controller=own)
         np.testing.assert_allclose(many.q[run], alone.q, atol=1e-13)
-    with pytest.raises(ControlError, match="cutoff must be less than"):
-        rd.rollouts(setup, Q0, V0, params={"velocity.low_pass.cutoff": [40.0, 200.0]})
+    with pytest.raises(ControlError, match="cutoff_rad_s must be less than"):
+        rd.rollouts(setup, Q0, V0, vary={"velocity.low_pass.cutoff_rad_s": [40.0, 200.0]})
 
 
 def test_two_periods_that_differ_in_their_ratio_share_no_machine_code() -> None:
@@ -295,7 +295,7 @@ def test_loops_that_have_no_meaning_are_refused() -> None:
         (lambda: rd.control.Loop(rd.control.Loop(PD)), "must not be a Loop"),
         (lambda: rd.control.Loop(PD, position=rd.control.Differences()), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[block, rd.control.Differences()]), "first block of velocity"),
-        (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(np.pi / T)]), "cutoff must be less than"),
+        (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(np.pi / T)]), "cutoff_rad_s must be less than"),
         (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(1.0, 3)]), "order"),
         (lambda: rd.control.Loop(PD, position=[rd.control.Quantisation([1.0, 2.0, 3.0])]), r"shape \(2,\)"),
         (lambda: rd.control.Loop(PD, measurement_delay=-0.5), "from 0 to 1000"),

@@ -45,7 +45,7 @@ def test_velocity_and_acceleration_are_derivatives(reference: PiecewisePolynomia
 
     Times keep 1e-3 s from the breaks: there only the lower derivatives are continuous.
     """
-    t = np.random.default_rng(1).uniform(reference.start, reference.end, 300)
+    t = np.random.default_rng(1).uniform(reference.start_s, reference.end_s, 300)
     t, h = t[np.abs(t[:, None] - reference.breaks).min(axis=1) > 1e-3], 1e-5
     _, v, a = reference.at(t)
     (q_after, v_after, _), (q_before, v_before, _) = reference.at(t + h), reference.at(t - h)
@@ -70,7 +70,7 @@ def test_at_a_break_the_piece_to_its_right_counts() -> None:
 
 @pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
 def test_it_rests_before_its_start_and_after_its_end(reference: PiecewisePolynomial) -> None:
-    for outside, end in [(reference.start - 0.3, reference.start), (reference.end + 7.0, reference.end)]:
+    for outside, end in [(reference.start_s - 0.3, reference.start_s), (reference.end_s + 7.0, reference.end_s)]:
         q, v, a = reference.at(outside)
         np.testing.assert_array_equal(q, reference.at(end)[0])
         assert not v.any()
@@ -80,7 +80,7 @@ def test_it_rests_before_its_start_and_after_its_end(reference: PiecewisePolynom
 @pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
 @pytest.mark.parametrize("shape", [(), (4,), (2, 3)])
 def test_times_may_carry_axes(reference: PiecewisePolynomial, shape: tuple[int, ...]) -> None:
-    t = np.random.default_rng(5).uniform(reference.start - 0.2, reference.end + 0.2, shape)
+    t = np.random.default_rng(5).uniform(reference.start_s - 0.2, reference.end_s + 0.2, shape)
     batch = reference.at(t)
     for got in batch:
         assert got.shape == (*shape, reference.n)
@@ -148,7 +148,7 @@ def test_circle_stays_on_its_circle(ramp: float | None, turns: float) -> None:
         return
     reference = circle(centre, r, normal, period, turns=turns, ramp_s=ramp, start_s=0.7)
     path = reference.position
-    p, _, V, _ = reference.at(np.linspace(path.start, path.end, 20001))
+    p, _, V, _ = reference.at(np.linspace(path.breaks[0], path.breaks[-1], 20001))
     assert np.abs(np.linalg.norm(p - centre, axis=-1) / r - 1).max() < 1e-9
     np.testing.assert_allclose((p - centre) @ normal, 0, atol=1e-15)
     speed = np.linalg.norm(V[:, :3], axis=-1)
@@ -156,7 +156,7 @@ def test_circle_stays_on_its_circle(ramp: float | None, turns: float) -> None:
     ends = 2 * np.pi * r / period if ramp == 0 else 0
     np.testing.assert_allclose(speed[[0, -1]], ends, atol=1e-12)
     rise = min(0.5, turns * period) if ramp is None else ramp
-    assert path.end - path.start == pytest.approx(turns * period + rise, rel=1e-14)
+    assert path.breaks[-1] - path.breaks[0] == pytest.approx(turns * period + rise, rel=1e-14)
 
 
 def test_circle_turns_by_the_right_hand_from_where_it_is_told() -> None:

@@ -116,7 +116,7 @@ def test_stops_plans_and_inverse_kinematics_keep_a_follower_within_its_limits() 
     assert np.abs(follower(stopped.q)).max() <= bound
     assert np.abs(follower(stopped.q)).max() == pytest.approx(0.1, abs=1e-9)
     plan = point_to_point(arm, [0.0], [0.05], acceleration=1.0, jerk=10.0)
-    t = np.linspace(0.0, plan.duration, 2001)
+    t = np.linspace(0.0, plan.duration_s, 2001)
     assert np.abs(-2 * plan.reference.at(t)[1]).max() <= 1.0 + 1e-12
     with pytest.raises(rd.RobotDynError):
         point_to_point(arm, [0.0], [0.09], acceleration=1.0, jerk=10.0)

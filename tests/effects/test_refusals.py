@@ -90,7 +90,7 @@ IN_A_PLANT = [
     (lambda: plant(3), "3 is neither a Force nor a Bound"),
     (lambda: rd.Plant(object(), "urdf"), "must be a robot, such as rd.load"),
     (lambda: plant(RigidStops(7.0, "urdf"), arm=UR5), "must lie below"),
-    (lambda: plant(RigidBacklash(0.0, 0.1)), "rigid_backlash: gap is 0 for all joints"),
+    (lambda: plant(RigidBacklash(0.0, 0.1)), "rigid_backlash: half_gap is 0 for all joints"),
     (lambda: plant(SeriesElastic(0.0, 0.1)), "series_elastic: stiffness is 0 for all joints"),
     (lambda: plant(LineSpringDamper("left_tol", None, **LINE), arm=TREE), "line_spring_damper: no frame 'left_tol'"),
     (lambda: plant(CarriedPayload(rd.Payload("tipp", 1.0))), "carried_payload: .*'tipp'"),

@@ -142,7 +142,7 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     the joint: the other side.
     """
     beta, F = 0.02, 1.3
-    drive = rd.effects.SeriesElastic(K, J, RATIO, backlash=beta)
+    drive = rd.effects.SeriesElastic(K, J, RATIO, half_gap=beta)
     push = rd.effects.ExternalWrench("cart", [F, 0, 0, 0, 0, 0])
     plant, law = rd.Plant(SLIDER, [drive] if side == 1 else [drive, push]), Ramp(F if side == 1 else 0.0)
     run = rd.simulate(plant, [0.0], duration_s=2.0, controller=law, engine=engine, **OFTEN)

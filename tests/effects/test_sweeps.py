@@ -39,7 +39,7 @@ POINTS = [[0.8, 0.2, 0.3], [0.6, 0.1, 1.0]]
 CASES = [
     ([rd.effects.DahlFriction(STIFFNESS, LEVEL, 1.5)], (SLIDER, [0.0], None, 0.5, beats),
      {"dahl_friction.exponent": [1.2, 2.0]}),
-    (STATES, ON_ARM, {"actuator_lag.time_constant": [[0.05, 0.02], [0.01, 0.08]]}),
+    (STATES, ON_ARM, {"actuator_lag.time_constant_s": [[0.05, 0.02], [0.01, 0.08]]}),
     (STATES, ON_ARM, {"lugre_friction.bristle_stiffness": [120.0, 60.0]}),
     (DRIVE, driven(0.005), STIFFNESSES),
     ([BETWEEN], ON_TREE, STRUT),
@@ -76,7 +76,7 @@ def test_each_run_is_that_of_the_effect_with_its_value(effects: Any, scene: Any,
     """In both engines: 1e-12 of positions, 1e-10 of what stiff effects make of them. Rollouts keep no states."""
     works = 1e-11 if effects is DRIVE else 1e-10
     given = {name: np.array(x) for name, x in params.items()}
-    runs = rd.rollouts(setup(effects, scene), params=given, record=("q", "v", "u", "work"))
+    runs = rd.rollouts(setup(effects, scene), vary=given, record=("q", "v", "u", "work"))
     for k in range(2):
         own = setup(changed(effects, given, k), scene)
         alone = rd.simulate(own, engine="interpreted")

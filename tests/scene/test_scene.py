@@ -39,7 +39,7 @@ v = {joint_2 = 0.5}
 PD = """
 [control]
 kind = "pd"
-frequency_rad_per_s = 10.0
+bandwidth_rad_s = 10.0
 [reference]
 kind = "quintic"
 q = [1.0, 0.5]
@@ -280,7 +280,7 @@ def test_kp_and_kd_are_the_gains(write, kind: str) -> None:
 @pytest.mark.parametrize("kind", JOINT)
 def test_frequency_and_damping_ratio_are_kp_and_kd(write, kind: str) -> None:
     """ω² and 2 ζ ω, times the diagonal of M without a model in the loop."""
-    law = built(write, kind, "frequency_rad_per_s = 7.0\ndamping_ratio = 0.6")
+    law = built(write, kind, "bandwidth_rad_s = 7.0\ndamping_ratio = 0.6")
     inertia = 1.0 if kind == "computed_torque" else np.diag(rd.load("planar_2r").M([0.3, -0.4]))
     np.testing.assert_allclose(law.kp, 49.0 * inertia * np.ones(2), rtol=1e-15)
     np.testing.assert_allclose(law.kd, 8.4 * inertia * np.ones(2), rtol=1e-15)
@@ -322,11 +322,11 @@ resolution_rad = {joint_1 = 1e-4, joint_2 = 2e-4}
 kind = "differences"
 [[control.velocity]]
 kind = "low_pass"
-cutoff_rad_per_s = 300.0
+cutoff_rad_s = 300.0
 order = 1
 [[control.actuation]]
 kind = "low_pass"
-cutoff_rad_per_s = 400.0
+cutoff_rad_s = 400.0
 [[control.actuation]]
 kind = "quantisation"
 resolution_N_m = 0.01
@@ -354,7 +354,7 @@ def test_a_loop_of_a_scene_is_that_of_python(write, tmp_path: Path) -> None:
     one, two = rd.simulate(setup), rd.simulate(setup, controller=by_hand())
     np.testing.assert_array_equal(one.q, two.q)
     np.testing.assert_array_equal(one.controller_states, two.controller_states)
-    saved = rd.load_run(rd.save_run(one, tmp_path / "run"))
+    saved = rd.read(one.save(tmp_path / "run"))
     np.testing.assert_array_equal(saved.controller_states, one.controller_states)
 
 

@@ -15,7 +15,7 @@ SCENE = """robot = "planar_2r"
 duration_s = 0.1
 [control]
 kind = "pd"
-frequency_rad_per_s = 5
+bandwidth_rad_s = 5
 [reference]
 kind = "samples"
 """
@@ -88,7 +88,7 @@ duration_s = 0.1
 q = {hinge = 0.3}
 [control]
 kind = "pd"
-frequency_rad_per_s = 5
+bandwidth_rad_s = 5
 [reference]
 kind = "via_points"
 """

@@ -109,7 +109,7 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.rollouts(ARM, np.zeros((0, 2)), method="RK4"), "of one number of runs"),
         (
             lambda: rd.rollouts(ARM, Q, method="RK4", events=[rd.Event(lambda t, q, v: v[0])], cuts=False),
-            "cuts=False: steps end at events, and so the runs go one after the other",
+            "cuts=False: steps end at events, so the runs are not in lock step",
         ),
         (lambda: rd.rollouts(ARM, Q, cuts=False), "cuts=False: DOP853 chooses its steps"),
         (lambda: rd.rollouts(ARM, Q, method="RK4", cuts="no"), "cuts must be True or False, got 'no'"),

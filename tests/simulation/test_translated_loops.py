@@ -190,7 +190,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
     starts[n, 5] = 1e200  # overflows at once
     of_levels = guard_levels(made.plant.dynamics, made.plant.effects, made.controller, W)
     times = {"sample_period": 0.02, "sample_slack": 1e-12}
-    config = loop_config(equation, False, largest=1e100, apart=0 if equation.sampled else 3, **times)
+    config = loop_config(equation, False)._replace(largest=1e100, apart=0 if equation.sampled else 3, **times)
     results = []
     for interpreted in (False, True):
         lanes = lanes_of(equation, starts, code.run_parameters({}), n + 2, plan.parameters[0], np.arange(W))

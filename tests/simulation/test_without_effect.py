@@ -112,7 +112,7 @@ def test_anti_windup_without_a_limit_is_refused() -> None:
 
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n'
 GRAVITY = '[[effect]]\nkind = "gravity"\n'
-CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
+CONTROL = '[control]\nkind = "{}"\nbandwidth_rad_s = 10.0\n'
 
 
 @pytest.mark.parametrize(

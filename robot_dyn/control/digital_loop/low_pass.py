@@ -27,14 +27,14 @@ class LowPass(Block):
     It starts in the steady state of the first sample.
 
     Attributes:
-        cutoff: ω, a scalar or (n,), in [rad/s], positive and less than π/period.
+        cutoff_rad_s: ω, a scalar or (n,), in [rad/s], positive and less than π/period.
         order: 1 or 2.
     """
 
     term = "y = x through Butterworth's filter"
     rounds = False
 
-    cutoff: Any = field(metadata=coefficient("rad/s", symbol="ω", above=0))
+    cutoff_rad_s: Any = field(metadata=coefficient("rad/s", symbol="ω", above=0))
     order: int = 2
 
     def __post_init__(self) -> None:
@@ -43,10 +43,10 @@ class LowPass(Block):
             raise ControlError(f"order of a low-pass filter must be 1 or 2, got {shown(self.order)}")
 
     def check(self, period_s: float) -> None:
-        if (np.asarray(self.cutoff) >= np.pi / period_s).any():
+        if (np.asarray(self.cutoff_rad_s) >= np.pi / period_s).any():
             raise ControlError(
-                f"cutoff must be less than π/period = {np.pi / period_s:.4g} rad/s at a period of {period_s:g} s, got"
-                f" {self.cutoff}; lower the cutoff, or shorten the period"
+                f"cutoff_rad_s must be less than π/period = {np.pi / period_s:.4g} rad/s at a period of {period_s:g} s,"
+                f" got {self.cutoff_rad_s}; lower the cutoff, or shorten the period"
             )
 
     def state_size(self, n: int) -> int:
@@ -71,7 +71,7 @@ class LowPass(Block):
 
     def _coefficients(self, period_s: float) -> tuple[list[Array], list[Array]]:
         """Return numerator b₀, b₁, … and denominator a₁, … of H in z⁻¹, with a₀ = 1."""
-        half = np.asarray(self.cutoff) * (period_s / 2)
+        half = np.asarray(self.cutoff_rad_s) * (period_s / 2)
         K = sin(half) / cos(half)
         if self.order == 1:
             b = K / (1 + K)

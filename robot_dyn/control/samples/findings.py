@@ -116,7 +116,7 @@ def _of_times(table: Recorded, reference: PiecewisePolynomial) -> Iterator[str]:
             f"no joint reaches 1 % of its speed limit in {t[-1] - t[0]:.6g} s, samples are {middle:.4g} s apart: are"
             f" the times in ms? State the unit in the heading, such as 't [ms]' or 't [s]'"
         )
-    start, duration = reference.start, reference.end - reference.start
+    start, duration = reference.start_s, reference.end_s - reference.start_s
     if start < 0 or start > max(_LATE_S, _LATE * duration):
         yield f"the first sample is at {start:.10g} s, but runs begin at 0 s; pass start_s=0 to shift the times"
 

@@ -1,7 +1,7 @@
 """The engine of machine code: a plug-in of `engine/`.
 
-- choice: machine code for a setup or a batch if it is worthwhile, by a count of evaluations.
+- choice: the engine for a setup or a batch: machine code if it saves time, by a count of evaluations.
 - machine_code: the engine; self_check: its comparison with the interpreted engine before its first use.
-- cache: machine code in this process and in the store; structure: the key; trace: the equation in symbols.
+- cache: machine code in this process and in the store; structure: its key; trace: the equation in symbols.
 - loop: the time loops as machine code, one for each method.
 """

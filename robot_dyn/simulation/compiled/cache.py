@@ -1,14 +1,14 @@
-"""Machine code of state equations: from this process by structure, from the store, or new.
+"""Machine code of state equations: cached by structure in this process, from the store, or new.
 
-code = machine_code(equation, method)
+    code = machine_code(equation, method)
 
-Neither LLVM nor CasADi is imported before something is traced or compiled: what exists is looked up before each run.
+Each run first checks these caches; LLVM and CasADi are imported only to trace or compile.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.parameters import Parameter, Part, parameters
@@ -20,21 +20,22 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import TraceError
 from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.integrate.adaptive import Adaptive
-from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.integrate.integrator import Integrator, PlainMethod
 from robot_dyn.model.right_angles import robot_of
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.machine_code import CompiledFunctions, MachineCode
 from robot_dyn.simulation.compiled.structure import changeable, of_library, structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 Method = Integrator | Adaptive
-_MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
+_MOST_INSTRUCTIONS = 100_000  # about ten seconds of compiling
 
 _robots, _symbols, _functions, _interpreted = (LRUByIdentity() for _ in range(4))
 
 
 class Traces(NamedTuple):
-    """Options of a trace: `extras` in a sample, see `trace`; the Jacobian; steps in which velocities may jump."""
+    """Options of a trace; see `trace`."""
 
     extras: tuple[str, ...] | None
     jacobian: bool
@@ -42,27 +43,27 @@ class Traces(NamedTuple):
 
 
 class Identified(NamedTuple):
-    """A state equation whose structure is known.
+    """A state equation with its structure, which identifies its machine code.
 
     Attributes:
-        equation: The equation itself.
-        compiled_form: The equation that is compiled: in a mode, of a robot with right angles written out in full.
-        known: Its parameters.
-        described: Its structure, the places of its parameters, and the options of its trace.
-        objects: Objects in it that are described by identity.
-        lasting: True if `described` identifies all of it, in another process too.
+        equation: The state equation.
+        compiled_form: The equation that is compiled: in a mode, with right angles to all digits of float64.
+        inputs: Parameters of the machine code.
+        described: The structure, the places of the parameters, and the options of the trace.
+        objects: Objects that are described by identity.
+        lasting: True if `described` identifies the equation also in another process.
     """
 
     equation: StateEquation
     compiled_form: StateEquation
-    known: tuple[Parameter, ...]
+    inputs: tuple[Parameter, ...]
     described: tuple[object, tuple[object, ...], Traces]
     objects: tuple[object, ...]
     lasting: bool
 
     @property
     def key(self) -> str:
-        """Key of its programs in a store."""
+        """Key of the programs in a store."""
         return digest(["programs", sources_of_programs(), repr(self.described)], processor=False)
 
 
@@ -77,16 +78,16 @@ def machine_code(
     cuts: bool = False,
     detects: bool = False,
 ) -> MachineCode:
-    """Return a state equation as machine code, from the cache if it is there; not compiled yet.
+    """Return a state equation as machine code, cached if possible; it is compiled on first use.
 
     Args:
         equation: The equation to compile.
-        method: The method of the run, whose time loop is machine code if its steps can be; None for no loop.
+        method: Method of the run; its time loop is machine code if its steps can be. None for no loop.
         lanes: Number of runs in lock step.
         extras: See `trace`.
         swept: Names of the parameters that differ from run to run.
         jacobian: True for the Jacobian of the rate, even if the method does not need it.
-        cuts: True if steps are chosen, or cut at events.
+        cuts: True if the method chooses its steps, or if steps end at events.
         detects: True if steps in lock step detect which runs may pass a threshold.
 
     Raises:
@@ -100,9 +101,9 @@ def existing(identified: Identified, method: Method, cuts: bool) -> MachineCode 
     """Return the machine code of a single run if it is in this process or in the store; or None.
 
     Args:
-        identified: Its state equation.
-        method: As in `machine_code`.
-        cuts: As in `machine_code`.
+        identified: The state equation of the run.
+        method: See `machine_code`.
+        cuts: See `machine_code`.
     """
     programs = None
     if _functions.known(identified.objects, (identified.described, 1, ())) is None:
@@ -116,14 +117,14 @@ def existing(identified: Identified, method: Method, cuts: bool) -> MachineCode 
 def _functions_of(
     identified: Identified, lanes: int = 1, swept: tuple[str, ...] = (), programs: Programs | None = None
 ) -> CompiledFunctions:
-    """The functions of a structure, cached."""
-    equation, known = identified.compiled_form, identified.known
+    """Return the functions of a structure, which are cached; raise TraceError if they have too many instructions."""
+    equation, inputs = identified.compiled_form, identified.inputs
 
     def compute() -> CompiledFunctions:
-        shared, name = _shared(equation, known, lanes, swept), equation.plant.dynamics.name  # pyright: ignore
+        shared, name = _shared(equation, inputs, lanes, swept), equation.plant.dynamics.name  # pyright: ignore
         return CompiledFunctions(programs or _programs_of(identified), lanes, name, shared, changeable(equation))
 
-    names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
+    names = tuple(name for name in dict.fromkeys(x.name for x in inputs) if name in swept)
     functions = _functions.get(identified.objects, (identified.described, lanes, names), compute)
     if (count := functions.programs.instructions) > _MOST_INSTRUCTIONS:
         raise TraceError(
@@ -134,57 +135,60 @@ def _functions_of(
 
 
 def _with_loop(
-    identified: Identified, functions: CompiledFunctions, method: Any, lanes: int = 1, cuts: bool = False,
+    identified: Identified, functions: CompiledFunctions, method: Method | None, lanes: int = 1, cuts: bool = False,
     detects: bool = False, swept: tuple[str, ...] = (),
 ) -> MachineCode:  # fmt: skip
-    """These functions with the loop of a method; without one where its step cannot be machine code."""
+    """Return functions with the loop of a method; without a loop if its step cannot be machine code."""
     loop, refused = None, ""
-    if method is not None and method.plain:
+    if isinstance(method, PlainMethod | Adaptive):
         from robot_dyn.simulation.compiled.loop import loop_for
 
         loop = loop_for(method, identified.compiled_form, cuts, lanes, detects)
         if isinstance(loop, SubsetError):
             loop, refused = None, str(loop)
-    equation, compiled_form, known, *_ = identified
-    return MachineCode(equation, compiled_form, functions, known, loop, swept, refused)
+    equation, compiled_form, inputs, *_ = identified
+    return MachineCode(equation, compiled_form, functions, inputs, loop, swept, refused)
 
 
 def with_numbers(code: MachineCode, equation: StateEquation) -> MachineCode:
-    """Return the machine code for an equation that differs in parameters alone, swept ones included."""
+    """Return the machine code for an equation that differs only in parameters, also in those that are not swept."""
     compiled_form = _compiled_form(equation, nonsmooth="problem" in code.code.programs)
-    known = _parameters(compiled_form, code.swept)
-    return replace(code, equation=equation, compiled_form=compiled_form, known=known)
+    inputs = _parameters(compiled_form, code.swept)
+    return replace(code, equation=equation, compiled_form=compiled_form, inputs=inputs)
 
 
 def machine_code_of_constants(equation: StateEquation, method: Method, *, lanes: int = 1) -> MachineCode:
-    """Return a state equation as machine code whose numbers are constants: none of them can be changed.
+    """Return a state equation as machine code without parameters: all its numbers are constants.
 
     Args:
-        equation: As in `machine_code`.
-        method: A method whose steps are machine code too.
-        lanes: Number of runs in lock step, of which no sample is recorded.
+        equation: The equation to compile.
+        method: Method with plain steps.
+        lanes: Number of runs in lock step. Samples of several runs are empty.
 
     Raises:
-        TraceError: As in `machine_code`.
+        TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
-    what = _traces(method, None if lanes == 1 else ())
-    compiled_form = _compiled_form(equation, what.nonsmooth)
-    programs = _traced(compiled_form, (), what, constants=True)
+    options = _traces(method, None if lanes == 1 else ())
+    compiled_form = _compiled_form(equation, options.nonsmooth)
+    programs = _traced(compiled_form, (), options, constants=True)
     functions = CompiledFunctions(programs, lanes, compiled_form.plant.dynamics.name)  # pyright: ignore
-    identified = Identified(equation, compiled_form, (), ((), (), what), (), False)
+    identified = Identified(equation, compiled_form, (), ((), (), options), (), False)
     return _with_loop(identified, functions, method, lanes)
 
 
 def _shared(
-    equation: StateEquation, known: tuple[Parameter, ...], lanes: int, swept: tuple[str, ...]
+    equation: StateEquation, inputs: tuple[Parameter, ...], lanes: int, swept: tuple[str, ...]
 ) -> dict[int, int]:
-    """Where the numbers stand that all runs in lock step share: behind those of each run."""
+    """Return the places of the parameters that all runs in lock step share, by index; they follow those of each run.
+
+    See `MachineCode.run_parameters` for the layout.
+    """
     if lanes == 1:
         return {}
     held = equation.plant.dynamics.n * equation.sampled
-    once = [each.name not in swept for each in known for _ in range(each.size)]
-    first = (held + len(once) - sum(once)) * lanes
-    numbers = (held + k for k, shared in enumerate(once) if shared)
+    is_shared = [x.name not in swept for x in inputs for _ in range(x.size)]
+    first = (held + len(is_shared) - sum(is_shared)) * lanes
+    numbers = (held + k for k, shared in enumerate(is_shared) if shared)
     return {k: first + i for i, k in enumerate(numbers)}
 
 
@@ -192,17 +196,17 @@ def identify(
     equation: StateEquation, method: Method | None, extras: tuple[str, ...] | None = None, swept: tuple[str, ...] = (),
     jacobian: bool = False,
 ) -> Identified:  # fmt: skip
-    """Return a state equation with its structure; arguments as in `machine_code`.
+    """Return a state equation with its structure; see `machine_code` for the arguments.
 
     Raises:
-        TraceError: If its bodies cannot be compiled.
+        TraceError: If the dynamics of the arm cannot be compiled.
     """
-    what = _traces(method, extras, jacobian)
-    compiled_form = _compiled_form(equation, what.nonsmooth)
-    known = _parameters(compiled_form, swept)
+    options = _traces(method, extras, jacobian)
+    compiled_form = _compiled_form(equation, options.nonsmooth)
+    inputs = _parameters(compiled_form, swept)
     described, objects, lasting = structure(compiled_form)
-    places = tuple(each.place for each in known)
-    return Identified(equation, compiled_form, known, (described, places, what), objects, lasting)
+    places = tuple(x.place for x in inputs)
+    return Identified(equation, compiled_form, inputs, (described, places, options), objects, lasting)
 
 
 def _traces(method: Method | None, extras: tuple[str, ...] | None, jacobian: bool = False) -> Traces:
@@ -212,7 +216,7 @@ def _traces(method: Method | None, extras: tuple[str, ...] | None, jacobian: boo
 
 
 def _compiled_form(equation: StateEquation, nonsmooth: bool) -> StateEquation:
-    """The equation that is compiled: a method with steps in which velocities may jump finds the mode by itself."""
+    """Return the equation to compile, in a mode unless the method determines the mode in each step (`nonsmooth`)."""
     equation = equation if nonsmooth else equation.in_a_mode
     plant = equation.plant
     robot = robot_to_compile(plant.dynamics)
@@ -224,16 +228,16 @@ def _parameters(compiled_form: StateEquation, swept: tuple[str, ...]) -> tuple[P
     return parameters(plant.dynamics, plant.effects, compiled_form.controller, swept)  # pyright: ignore
 
 
-def robot_to_compile(dynamics: Any) -> Robot:
-    """Return the robot whose equations are compiled, its right angles written out in full.
+def robot_to_compile(dynamics: object) -> Robot:
+    """Return the robot to compile, with right angles to all digits of float64.
 
     Raises:
-        TraceError: If there is none, or it has no answer.
+        TraceError: If the dynamics are not those of a robot's file, or a joint has no inertia.
     """
 
     def compute() -> Robot | None:
         robot = robot_of(dynamics)
-        if robot is None or not of_library(type(dynamics)):  # another class may have equations of its own
+        if robot is None or not of_library(type(dynamics)):  # another class may have other equations
             raise TraceError(
                 f"{type(dynamics).__name__} comes from no robot's file and cannot be compiled: take a Robot, "
                 "or engine='interpreted'"
@@ -242,30 +246,30 @@ def robot_to_compile(dynamics: Any) -> Robot:
             raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: take engine='interpreted'")
         return None if robot is dynamics else robot
 
-    return _robots.get((dynamics,), (), compute) or dynamics
+    return _robots.get((dynamics,), (), compute) or cast(Robot, dynamics)
 
 
 def _stored(identified: Identified) -> Programs | None:
-    """The programs in the store; None if they are not there, or the structure is known in this process alone."""
+    """Return the programs in the store; None if there are none, or if only this process can identify the structure."""
     store = default_store() if identified.lasting else None
     payload = None if store is None else store.load(identified.key)
     return None if payload is None else Programs.read(payload.decode())
 
 
 def interpreted_before(identified: Identified) -> list[float]:
-    """The count of evaluations that runs of a structure have taken without machine code."""
+    """Return the number of evaluations of the interpreted runs of a structure, in a list that `choice` updates."""
     return _interpreted.get(identified.objects, (identified.described,), lambda: [0.0])
 
 
 def _programs_of(identified: Identified) -> Programs:
-    """The programs of a state equation.
+    """Return the programs of a state equation, from the store or by a trace, which is stored.
 
     Raises:
-        TraceError: If a part of it cannot be compiled; names it.
+        TraceError: If a part of the equation cannot be compiled; names the part.
     """
     if (programs := _stored(identified)) is not None:
         return programs
-    programs = _traced(identified.compiled_form, identified.known, identified.described[2])
+    programs = _traced(identified.compiled_form, identified.inputs, identified.described[2])
     store = default_store() if identified.lasting else None
     equation = identified.compiled_form
     if store is not None and structure(equation).described == identified.described[0]:  # a trace may have changed it
@@ -274,19 +278,22 @@ def _programs_of(identified: Identified) -> Programs:
 
 
 @interrupts_later()
-def _traced(equation: StateEquation, known: tuple[Parameter, ...], what: Traces, constants: bool = False) -> Programs:
-    """The programs of a state equation by a trace; arguments as of `Identified`, and whether numbers are constants."""
+def _traced(
+    equation: StateEquation, inputs: tuple[Parameter, ...], options: Traces, constants: bool = False
+) -> Programs:  # fmt: skip
+    """Return the programs of a state equation by a trace; with `constants`, no number is a parameter."""
     from robot_dyn.codegen.trace.from_casadi import program_of
     from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
     from robot_dyn.simulation.compiled.trace import trace
 
-    def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
-        """Its equations in symbols, traced once for a file and its edits."""
-        robot, inputs = robot_to_compile(dynamics), tuple(each for each in known if each.part == part)
-        if constants:  # cached symbols are of one robot but for the numbers that are inputs
+    def symbols_of(dynamics: Dynamics, part: Part) -> SymbolicDynamics:
+        """Return the equations of a robot in symbols, which are cached by its file, edits and parameters."""
+        robot, of_robot = robot_to_compile(dynamics), tuple(x for x in inputs if x.part == part)
+        if constants:  # cached symbols are valid for other values of the parameters, not for other constants
             return SymbolicDynamics(robot)
         described = structure(StateEquation(Plant(robot), None)).described
-        places = tuple(each.place for each in inputs)
-        return _symbols.get((), (described, places), lambda: SymbolicDynamics(robot, inputs))
+        places = tuple(x.place for x in of_robot)
+        return _symbols.get((), (described, places), lambda: SymbolicDynamics(robot, of_robot))
 
-    return Programs({name: program_of(each) for name, each in trace(equation, bodies, known, *what).items()})
+    functions = trace(equation, symbols_of, inputs, *options)
+    return Programs({name: program_of(function) for name, function in functions.items()})

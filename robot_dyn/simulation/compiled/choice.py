@@ -1,18 +1,18 @@
-"""The engine of machine code for a setup or a batch, or Python where compiling is not worthwhile or impossible.
+"""The choice of the engine for a setup or a batch: machine code, or Python if compiling takes longer or is impossible.
 
-The choice is made by a count, about how often the equation of motion is evaluated: the same on every machine.
-Machine code that this process already has, or the store, is used in any case.
+The criterion is the approximate number of evaluations of the equation of motion, so that it is the same on every
+machine. Machine code that is in this process or in the store is always used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from typing import Any
 
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached
 from robot_dyn.foundations.waiting import log_if_slow
+from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.simulation.compiled.cache import (
     existing,
     identify,
@@ -26,12 +26,12 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import Interpreted, interpreted_engine
 from robot_dyn.simulation.setup.setup import Setup, segments
 
-# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
-# it without the time loop, which is compiled once for a version of this library.
+# Interpreted evaluations, of about 0.1 ms, that take as long as imports, trace and LLVM, 1 to 2 s; half as many if the
+# time loop is in the store. The loop is compiled once for a version of this library.
 _COMPILED = 20_000
 _WITHOUT_LOOP = _COMPILED / 2
-_GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
-_PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
+_GUESSED = 10  # evaluations in a step of an implicit method, without those of its Jacobian
+_PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: per second, and at least per segment
 
 
 def choose(setup: Setup, seen: float) -> Engine:
@@ -59,7 +59,7 @@ def engine_of(setup: Setup, seen: float) -> Engine:
 
 
 def choose_for_batch(setup: Setup, swept: tuple[str, ...]) -> Engine:
-    """Return the engine of runs that go one after the other on each thread: machine code, unless it is not wanted.
+    """Return the engine for runs one after the other on each thread: machine code unless engine="interpreted".
 
     Args:
         setup: The setup of all runs.
@@ -107,7 +107,10 @@ def _of_one_run(setup: Setup, swept: tuple[str, ...] = ()) -> MachineCode:
 
 
 def _is_worthwhile(setup: Setup, before: list[float], seen: float) -> bool:
-    """Whether compiling takes less time than this run and those of its structure that were interpreted before it."""
+    """Return True if compiling takes less time than this run and the earlier interpreted runs of its structure.
+
+    Otherwise, the evaluations of the run are added to `before`, those of the earlier runs.
+    """
     size = setup.equation.size
     count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
     if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
@@ -117,7 +120,7 @@ def _is_worthwhile(setup: Setup, before: list[float], seen: float) -> bool:
 
 
 def _has_loop(setup: Setup) -> bool:
-    """Whether the time loop is in the store."""
+    """Return True if the time loop is in the store."""
     from robot_dyn.simulation.compiled.loop import loop_of
 
     method, holds = setup.method, bool(setup.plant.equation_of_motion.set_valued)
@@ -125,22 +128,22 @@ def _has_loop(setup: Setup) -> bool:
 
 
 def _evaluations(setup: Setup, size: int) -> float:
-    """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
-    method: Any = setup.method
-    if method.controls_error:
-        of_run = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
+    """Return about the number of evaluations of a run with its companions, for an equation with `size` entries of y."""
+    if isinstance(setup.method, Adaptive):
+        count = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
     else:
-        of_run = setup.steps * (method.evaluations_per_step or _GUESSED)
-    return of_run * _in_all(setup, size)
+        count = setup.steps * (setup.method.evaluations_per_step or _GUESSED)
+    return count * _in_all(setup, size)
 
 
 def _in_all(setup: Setup, size: int) -> float:
-    """Evaluations for each one of a run: those of its Jacobians, and of its companions by halved and by other steps."""
+    """Return the total number of evaluations per evaluation of a run: with its Jacobians and its companion runs."""
     companions = (2 if setup.method.controls_error else 1) if setup.estimate_error else 0
     return (1 + companions) * _with_jacobians(setup, size)
 
 
 def _with_jacobians(setup: Setup, size: int) -> float:
-    """Evaluations for each one of a step, those for a Jacobian by differences in each step included."""
-    method: Any = setup.method
-    return 1 + 2 * size / (method.evaluations_per_step or _GUESSED) if method.needs_jacobian else 1
+    """Return the number of evaluations per evaluation of a step, with a Jacobian by differences in each step."""
+    if not setup.method.needs_jacobian:
+        return 1
+    return 1 + 2 * size / (setup.method.evaluations_per_step or _GUESSED)

@@ -1,6 +1,6 @@
 """The engine of machine code: the functions of a state equation, their parameters, and the time loop.
 
-LLVM is imported where something is compiled or loaded.
+LLVM is imported when machine code is compiled or loaded.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 _MODE = "held", "_direction", "_contact"  # coefficients of set-valued effects
-STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
+STEP = "problem", "newton", "after_step"  # programs of the function `step`; the last is also a function alone
 
 
 class States(NamedTuple):
@@ -49,12 +49,12 @@ class CompiledFunctions:
     """The functions of a state equation, as programs and machine code.
 
     Attributes:
-        programs: rate, energy and sample, tick where there is one, and jacobian where a method needs it.
-        runs: W.
-        name: Of what moves, for messages.
-        shared: As of `write_function`.
-        changeable: Names of the parts whose code may be another at the next run, or do what a trace does not see.
-        checked: States at which they were compared with the interpreted equation, by the loops that they ran in.
+        programs: Programs of the functions by name; see `trace`.
+        runs: Number W of runs in lock step.
+        name: Name of the arm, for messages.
+        shared: See `write_function`.
+        changeable: Names of the parts whose code may change between runs, or do more than a trace contains.
+        checked: States at which the functions were compared with the interpreted equation, by the loop that ran them.
     """
 
     programs: Programs
@@ -62,14 +62,14 @@ class CompiledFunctions:
     name: str
     shared: Mapping[int, int] = field(default_factory=dict)
     changeable: tuple[str, ...] = ()
-    checked: dict[Any, States] = field(default_factory=dict, repr=False)
+    checked: dict[MachineFunction | None, States] = field(default_factory=dict, repr=False)
 
     @cached_property
     def _key(self) -> str:
         return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), str(self.programs)])
 
     def is_kept(self) -> bool:
-        """Whether its machine code is in the store."""
+        """Return True if the machine code is in the store."""
         store = default_store()
         return store is not None and store.load(self._key) is not None
 
@@ -82,68 +82,68 @@ class CompiledFunctions:
         def write(module: Any, prefix: str) -> None:
             for name, program in self.programs.items():
                 if name == "problem":
-                    three: Any = tuple(self.programs[each] for each in STEP)
-                    write_step(module, f"{prefix}step", three, self.runs, self.shared, PASSES)
+                    step: Any = tuple(self.programs[part] for part in STEP)
+                    write_step(module, f"{prefix}step", step, self.runs, self.shared, PASSES)
                 elif name != "newton":
-                    shared = {} if name == "behind" else self.shared
+                    shared = {} if name == "after_step" else self.shared
                     write_function(module, f"{prefix}{name}", program, self.runs, shared)
 
         written = {*self.programs, *(["step"] if "problem" in self.programs else [])}
-        known = [name for name in Functions._fields if name in written]
+        names = [name for name in Functions._fields if name in written]
         about = f"the state equation of {self.name}"
-        addresses = machine_code.addresses(known, self._key, write, default_store(), about)
-        return Functions(**dict.fromkeys(Functions._fields, 0) | dict(zip(known, addresses, strict=True)))
+        addresses = machine_code.addresses(names, self._key, write, default_store(), about)
+        return Functions(**dict.fromkeys(Functions._fields, 0) | dict(zip(names, addresses, strict=True)))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class MachineCode:
-    """The engine that evaluates a state equation by machine code; further attributes as in `Engine`.
+    """The engine that evaluates a state equation by machine code; see `Engine` for the other attributes.
 
     Attributes:
         equation: The state equation of the setup.
-        compiled_form: The equation that was compiled: in a mode, with right angles written out in full.
-        code: Its functions as machine code.
-        known: Its parameters, with the values of the setup.
+        compiled_form: The equation that was compiled: in a mode, with right angles to all digits of float64.
+        code: The functions as machine code.
+        inputs: Parameters of the functions, with the values of the setup.
         machine_loop: The time loop as machine code; None if steps are taken in Python.
         swept: Names of the parameters that differ from run to run.
-        refused: Why steps are taken in Python although those of the method might be machine code.
+        refused: Reason why a user-defined method takes its steps in Python; empty without one.
     """
 
     equation: StateEquation
     compiled_form: StateEquation
     code: CompiledFunctions
-    known: tuple[Parameter, ...]
+    inputs: tuple[Parameter, ...]
     machine_loop: MachineFunction | None
     swept: tuple[str, ...] = ()
     refused: str = ""
     exact_right_angles: ClassVar[bool] = True
-    doubtful: ClassVar[float] = 1e6  # machine code does not see that M becomes singular
+    doubtful: ClassVar[float] = 1e6  # machine code does not detect a singular M
     most_threads: ClassVar[float] = inf
     most_evaluations: float = field(default=inf, init=False)
 
     @property
     def label(self) -> str:
-        """Its name in the summary of a run; see `Engine`."""
+        """Name of the engine in the summary of a run; see `Engine`."""
         if self.machine_loop is not None:
             return "compiled"
-        why = f": {self.refused}" if self.refused else ""
-        return f"compiled (the equation of motion; steps in Python{why})"
+        reason = f": {self.refused}" if self.refused else ""
+        return f"compiled (the equation of motion; steps in Python{reason})"
 
     @property
     def most_steps(self) -> float:
-        """Steps after which the loop returns; see `Engine`."""
+        """Number of steps after which the loop returns; see `Engine`."""
         return 1 if self.machine_loop is None else inf
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
-        """Return the functions of an equation, with its numbers; see `Engine`."""
+        """Return the functions with the numbers of an equation; see `Engine`."""
         in_python = self.in_python
         functions = in_python if self.machine_loop is None else self.code.addresses
         numbers = self.parameters if equation is self.equation else self._numbers(equation)
         return Evaluated(functions, in_python, numbers, True)
 
     def _numbers(self, equation: StateEquation) -> np.ndarray:
-        """Parameters of an equation with other values, cached for the latest machine code."""
+        """Return the values of the parameters in an equation with other numbers, cached for the latest machine code."""
         latest = equation.cache.get(MachineCode)
         if latest is None or latest[0] is not self:
             latest = equation.cache[MachineCode] = self, self.parameters_of(equation)
@@ -152,7 +152,7 @@ class MachineCode:
     def places(self) -> Places:
         """Return the places of the mode among the parameters of effects; see `Engine`."""
         plant = self.equation.plant
-        return _places(self.known, plant.effects, plant.dynamics.n * self.equation.sampled)
+        return _places(self.inputs, plant.effects, plant.dynamics.n * self.equation.sampled)
 
     def loop(self) -> Advance | None:
         """Return the time loop, which stores the addresses of its arrays; None if it is not compiled."""
@@ -164,47 +164,51 @@ class MachineCode:
 
     @cached_property
     def parameters(self) -> np.ndarray:
-        """The values of the parameters, one row after the other."""
-        return joined(self.known)
+        """The values of the parameters, (P,)."""
+        return joined(self.inputs)
 
     def parameters_of(self, equation: StateEquation) -> np.ndarray:
-        """The values of the parameters of a state equation with other coefficients of its parts, or other payloads."""
+        """Return the values of the parameters in an equation with other coefficients or payloads, (P,)."""
         plant = equation.plant
-        of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
-        of[CONTROLLER] = equation.controller
-        known = [
-            replace(each, value=np.broadcast_to(value, each.value.shape))
-            if each.part in of and (value := value_at(of[each.part], each.key)) is not None  # no mode is chosen yet
-            else each
-            for each in self.known
+        parts: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+        parts[CONTROLLER] = equation.controller
+        inputs = [
+            replace(x, value=np.broadcast_to(value, x.value.shape))
+            if x.part in parts and (value := value_at(parts[x.part], x.key)) is not None  # None: no mode is chosen yet
+            else x
+            for x in self.inputs
         ]
         if plant.equation_of_motion.payloads:
-            bodies = {each.key: each.value for each in parameters(plant.dynamics, (), None, self.swept)}
-            known = [replace(each, value=bodies[each.key]) if each.part == ROBOT else each for each in known]
-        return joined(known)
+            bodies = {x.key: x.value for x in parameters(plant.dynamics, (), None, self.swept)}
+            inputs = [replace(x, value=bodies[x.key]) if x.part == ROBOT else x for x in inputs]
+        return joined(inputs)
 
     def run_parameters(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.
+        """Return the run parameters of W runs, (O, W): the zero-order hold, then the swept parameters, then the others.
 
-        A single run has all of them row by row.
+        A swept parameter has a row for each of its numbers. The others are shared by all runs and fill further rows in
+        their order. For a single run, all parameters are in their order.
+
+        Args:
+            swept: Values of the swept parameters by name, (W, size) each.
         """
         held, W = self.equation.plant.dynamics.n * self.equation.sampled, self.code.runs
         if W == 1:
             return np.concatenate([np.zeros(held), self.parameters])[:, None]
-        shared = [each for each in self.known if each.name not in swept]
-        names = [each.name for each in self.known if each.name in swept]
+        shared = joined([x for x in self.inputs if x.name not in swept])
+        names = [x.name for x in self.inputs if x.name in swept]
         rows = np.vstack([np.zeros((held, W)), *(swept[name].T for name in names)])
-        block = np.zeros((-(-sum(each.size for each in shared) // W), W))
-        block.ravel()[: sum(each.size for each in shared)] = joined(shared)
+        block = np.zeros((-(-len(shared) // W), W))
+        block.ravel()[: len(shared)] = shared
         return np.vstack([rows, block])
 
     @cached_property
     def in_python(self) -> Functions:
-        """The functions as Python calls them."""
+        """The functions as Python functions."""
         return Functions(*(_callable(address) if address else 0 for address in self.code.addresses))
 
     def is_kept(self) -> bool:
-        """Whether its machine code is in this process or in the store, with its loop."""
+        """Return True if the machine code and its loop are in this process or in the store."""
         checked, loop = self.code.checked, self.machine_loop
         if loop in checked:
             return True
@@ -220,11 +224,11 @@ def _callable(address: int) -> Callable[..., None]:
     return call
 
 
-def _places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) -> Places:
-    """Return where the parameters of effects have the mode; the first parameter is at place `first`."""
-    at: dict[str, list[int]] = {name: [] for name in _MODE}
-    for each in known:
-        if each.part[0] == "effect" and isinstance(effects[int(each.part[1])], SetValued) and each.key in at:
-            at[each.key].append(first)
-        first += each.size
-    return Places(*(np.array(each, np.int64) for each in at.values()))
+def _places(inputs: Sequence[Parameter], effects: Sequence[Effect], first: int) -> Places:
+    """Return the places of the mode among the run parameters; the first parameter is at place `first`."""
+    places: dict[str, list[int]] = {name: [] for name in _MODE}
+    for x in inputs:
+        if x.part[0] == "effect" and isinstance(effects[int(x.part[1])], SetValued) and x.key in places:
+            places[x.key].append(first)
+        first += x.size
+    return Places(*(np.array(rows, np.int64) for rows in places.values()))

@@ -1,9 +1,9 @@
-"""The self-check of machine code: it is compared with the interpreted equations before it is used.
+"""The self-check of machine code: a comparison with the interpreted equations before its first use.
 
-    |y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at states of the run or at random ones, or it is refused
+    |y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at states of the run or at random states; otherwise MachineError
 
-The Jacobian is compared with differences of the interpreted equation. Two spans show by how much differences may be
-wrong themselves: by rounding, or where a kink lies between.
+The Jacobian is compared with differences of the interpreted equation. Differences over two spans show their own error,
+which comes from rounding, or from a kink within the span.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ _AGREES = 1e-13
 _LENGTH = 1e-3  # [s], of a step that is compared
 
 _RANDOM = 4  # states
-_FIRST_S, _MOST = 1.0, 2000  # [s] of a run that are interpreted first, and its evaluations, some 0.2 s
+_FIRST_S, _MOST = 1.0, 2000  # part of a run that is interpreted first, in [s], and evaluations for it, about 0.2 s
 _ALONG, _AT_TIMES = 100, 100  # states of the first second, and states at random times of the whole run
-_AGAIN = 4  # of either
-_TRIES = 4  # of spans, each a tenth; then the start alone is left
+_AGAIN = 4  # half the number of states before a later run
+_TRIES = 4  # of spans, each a tenth of the previous one; then only the start is compared
 
 _DIFFERENCES = 1e-6  # of a column: differences are right to some 1e-10 of f, over columns of other units
 _NARROWER = 4.0
@@ -47,18 +47,18 @@ Pairs = Iterator[tuple[Array, Array]]  # a result of machine code, and that of t
 
 
 class MachineError(RobotDynError):
-    """Machine code that does not agree with the interpreted equations; nothing of it is used."""
+    """Machine code that does not agree with the interpreted equations; it is not used."""
 
 
 class _Evaluated(NamedTuple):
-    """The functions at one time, in W lanes.
+    """Results of the functions at one time, in W lanes.
 
     Attributes:
-        t: In [s].
+        t: Time, in [s].
         y: States, (m, W).
-        p: Of the segment.
-        run_parameters: Of each lane, (O, W).
-        results: Of each function that is called by itself, (size, W).
+        p: Numbers of the segment.
+        run_parameters: Parameters of each lane, (O, W).
+        results: Results of the functions by name, without those of a nonsmooth step, (size, W) each.
     """
 
     t: float
@@ -68,18 +68,18 @@ class _Evaluated(NamedTuple):
     results: Mapping[str, Array]
 
     def held(self, equation: StateEquation, lane: int) -> Array | None:
-        """The actuation in zero-order hold of a lane; None without."""
+        """Return the actuation of a lane in zero-order hold; None for a continuous controller."""
         return self.run_parameters[: equation.plant.dynamics.n, lane] if equation.sampled else None
 
 
 def check(code: MachineCode, setup: Setup) -> None:
     """Compare machine code with the interpreted equations.
 
-    Once is enough, at random states, where the version of this library identifies the code of all parts. Any other part
-    is compared at states of the first second of its run, and at some of these before each later run.
+    If all parts are of this library, code is compared once, at random states. With user-defined parts, it is compared
+    at states of the first second of the first run, and at some of these states before each later run.
 
     Raises:
-        MachineError: If they differ by more than rounding.
+        MachineError: If the results differ by more than rounding.
     """
     checked, changeable = code.code.checked, code.code.changeable
     controller = models_in_full(code.compiled_form.controller, robot_to_compile)  # as they are traced
@@ -98,7 +98,7 @@ def _compare(code: MachineCode, setup: Setup, states: States) -> None:
     rng, equation, functions = np.random.default_rng(20), code.compiled_form, code.code
     W, table, held = functions.runs, segment_table(setup), equation.plant.dynamics.n * equation.sampled
     results = {name: np.empty((functions.programs.results(name), W)) for name in functions.programs}
-    swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in code.known if each.name in code.swept}
+    swept = {x.name: np.tile(x.value.ravel(), (W, 1)) for x in code.inputs if x.name in code.swept}
     run_parameters = code.run_parameters(swept)
     for i, time in enumerate(states.t.tolist()):
         p = table.parameters[int(np.searchsorted(table.starts[:-1], time, side="right")) - 1]
@@ -113,7 +113,7 @@ def _compare(code: MachineCode, setup: Setup, states: States) -> None:
                 _compare_lane(code, at, lane)
         except RobotDynError:
             raise
-        except Exception as error:  # of changeable code
+        except Exception as error:  # raised by user-defined code
             parts = " or ".join(functions.changeable)
             raise MachineError(f"{parts} raises at t = {round(t, 9):g} s ({because(error)})") from error
         if "jacobian" in results:
@@ -136,7 +136,7 @@ def _compare_lane(code: MachineCode, at: _Evaluated, lane: int) -> None:
 
 
 def _results_of_lane(code: MachineCode, at: _Evaluated, lane: int) -> Pairs:
-    """What the functions return for a lane, quantity by quantity, and what the equation gives."""
+    """Yield the results of a lane, quantity by quantity, with those of the interpreted equation."""
     equation, t, y, held = code.compiled_form, at.t, at.y[:, lane], at.held(code.compiled_form, lane)
     ours, single = {name: out[:, lane] for name, out in at.results.items()}, code.code.runs == 1
     n, m = equation.plant.dynamics.n, equation.size
@@ -155,7 +155,7 @@ def _results_of_lane(code: MachineCode, at: _Evaluated, lane: int) -> Pairs:
         yield ours["events"], equation.event_values(t, y, held)
     if "bodies" in ours:
         both = ours["bodies"], equation.bodies(t, y, held)
-        yield from zip(*(np.split(each, [n * n]) for each in both), strict=True)
+        yield from zip(*(np.split(x, [n * n]) for x in both), strict=True)
     if "tick" in ours:
         after, command = equation.tick(t, y)
         yield ours["tick"][:n], np.asarray(command)
@@ -163,7 +163,7 @@ def _results_of_lane(code: MachineCode, at: _Evaluated, lane: int) -> Pairs:
 
 
 def _results_of_step(code: MachineCode, at: _Evaluated) -> Pairs:
-    """y⁺, v⁺ and its places by a step of time stepping, lane by lane, and what the equation gives."""
+    """Yield y⁺, v⁺ and its places after a step of Moreau and Jean, lane by lane, with those of the equation."""
     equation, (m, W) = code.compiled_form, at.y.shape
     n = equation.plant.dynamics.n
     x = np.vstack([at.y, np.full((1, W), _LENGTH), np.zeros((n, W))])
@@ -176,37 +176,37 @@ def _results_of_step(code: MachineCode, at: _Evaluated) -> Pairs:
 
 
 def _difference(x: Array, y: Array, start: Array) -> float:
-    """The largest difference of two results, by the size of the second and of the state."""
+    """Return the largest difference of x and y, relative to the largest number of y and of the state `start`."""
     size = max(float(np.abs(y).max(initial=1.0)), float(np.abs(start).max()))
     return float(np.abs(x - y).max(initial=0.0) / size) if np.isfinite(x).all() and np.isfinite(y).all() else np.inf
 
 
-def _differs(code: MachineCode, what: str, worst: float, allowed: float, t: float) -> MachineError:
-    of, remedy = f"of {code.code.name}", "take engine='interpreted', and report it"
+def _differs(code: MachineCode, function: str, worst: float, allowed: float, t: float) -> MachineError:
+    subject, remedy = f"of {code.code.name}", "take engine='interpreted', and report it"
     if parts := code.code.changeable:
-        of = f"with {' or '.join(parts)}"
+        subject = f"with {' or '.join(parts)}"
         remedy = (
-            "methods must be functions of their arguments and of what their part declares; take"
+            "methods must be functions of their arguments and of the fields of their part; take"
             " engine='interpreted', or create a part again that was changed after a run"
         )
     return MachineError(
-        f"the compiled {what} {of} differs from the interpreted one by {worst:.1e} of its size at"
+        f"the compiled {function} {subject} differs from the interpreted one by {worst:.1e} of its size at"
         f" t = {round(t, 9):g} s, {allowed:.1e} allowed: {remedy}"
     )
 
 
 def _random_states(setup: Setup, size: int) -> States:
-    """Random states of that size at random segments of a run."""
+    """Return random states of `size` entries, at a time in each of several random segments of a run."""
     rng, table = np.random.default_rng(20), segment_table(setup)
     segments = rng.integers(len(table.counts) - 1, size=_RANDOM)
     return States(table.starts[segments] + table.lengths[segments], rng.normal(size=(_RANDOM, size)))
 
 
 def _states_of_run(setup: Setup) -> States:
-    """States of the first second of a run, at their times and at random times of the whole run.
+    """Return states of the first second of a run, at their own times and again at random times of the whole run.
 
-    They lie halfway between the ends of steps, where rates may have kinks. Those at other times are for code that does
-    on symbols what it does on early times.
+    They are midpoints of steps, because rates may have kinks at the ends of steps. The random times show code whose
+    trace is right at early times only.
     """
     path = _first_second(setup)
     ends = np.unique(np.linspace(0, max(len(path.t) - 2, 0), _ALONG).astype(int))
@@ -217,13 +217,13 @@ def _states_of_run(setup: Setup) -> States:
 
 
 def _some(states: States) -> States:
-    """A few of these states, the first and the last among them."""
+    """Return some of these states, with the first and the last."""
     rows = np.unique(np.linspace(0, len(states.t) - 1, 2 * _AGAIN).astype(int))
     return States(states.t[rows], states.y[rows])
 
 
 def _first_second(setup: Setup) -> Path:
-    """The first second of a run by the interpreted engine, or as much of it as takes few evaluations; or its start."""
+    """Return the first second of a run by the interpreted engine; a shorter part if it needs too many evaluations."""
     span = min(setup.duration_s, _FIRST_S)
     if not setup.method.controls_error:
         span = min(span, _MOST / (setup.method.evaluations_per_step or 1) * setup.taken_step_s)
@@ -242,14 +242,14 @@ def _first_second(setup: Setup) -> Path:
 
 
 def jacobian_error(equation: StateEquation, t: float, y: Array, held: Array | None, p: Array, J: Array) -> float:
-    """Return how far a Jacobian is from differences, over what is allowed: at most 1 if it agrees.
+    """Return the largest ratio of the difference between a Jacobian and differences to the allowed one; ≤ 1 to agree.
 
     Args:
         equation: The interpreted state equation.
         t: Time within the segment.
         y: State, (m,).
         held: The actuation in zero-order hold, or None.
-        p: Of the segment.
+        p: Numbers of the segment.
         J: ∂f/∂y_j for each j, then ∂f/∂t, (m + 1, m).
     """
 

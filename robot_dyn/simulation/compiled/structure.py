@@ -1,7 +1,7 @@
-"""The structure of a state equation: all that its machine code depends on besides the parameters.
+"""The structure of a state equation: everything its machine code depends on other than the parameters.
 
-Two setups of one structure run the same code. User-defined code is identified by the object, since it may change,
-and by its definition where it has one, which identifies it in another process too.
+Setups of equal structure run the same code. User-defined code is identified by the object, because it may change, and
+by its source if there is one, which identifies it also in another process.
 """
 
 from __future__ import annotations
@@ -31,37 +31,37 @@ class Structure(NamedTuple):
     """The structure of a state equation.
 
     Attributes:
-        described: In hashable values.
-        objects: What stands in it by identity.
-        lasting: Whether `described` identifies all of it, in another process too.
+        described: The structure in hashable values.
+        objects: Objects that are described by identity.
+        lasting: True if `described` identifies the equation also in another process.
     """
 
-    described: tuple[Any, ...]
-    objects: tuple[Any, ...]
+    described: tuple[object, ...]
+    objects: tuple[object, ...]
     lasting: bool
 
 
 def structure(equation: StateEquation) -> Structure:
-    """The structure of a state equation."""
-    found = _Found()
-    described = tuple(found.of_part(each) for each in _parts(equation))
+    """Return the structure of a state equation."""
+    description = _Description()
+    described = tuple(description.of_part(part) for part in _parts(equation))
     controller = equation.controller
     period = None
-    if controller is not None:  # without states, a sampled controller is one whatever its period
+    if controller is not None:  # the period matters only to a controller with states
         period = controller.period_s if controller.state_size else controller.period_s > 0
     whole = described, period, equation.canonical, equation.limited
-    return Structure(whole, tuple(found.objects), found.lasting)
+    return Structure(whole, tuple(description.objects), description.lasting)
 
 
 def changeable(equation: StateEquation) -> tuple[str, ...]:
-    """Names of the parts whose code the version of this library does not identify: it may change from run to run."""
+    """Return the names of the parts with user-defined code, which may change between runs."""
 
     def by_identity(part: Any) -> bool:
-        found = _Found()
-        found.of_part(part)
-        return bool(found.objects)
+        description = _Description()
+        description.of_part(part)
+        return bool(description.objects)
 
-    return tuple(getattr(each, "name", type(each).__name__) for each in _parts(equation) if by_identity(each))
+    return tuple(getattr(part, "name", type(part).__name__) for part in _parts(equation) if by_identity(part))
 
 
 def _parts(equation: StateEquation) -> tuple[Any, ...]:
@@ -69,24 +69,24 @@ def _parts(equation: StateEquation) -> tuple[Any, ...]:
 
 
 def _numbered(part: Any) -> frozenset[str]:
-    """Paths in a part to what has its numbers in the parameters, or in those of a segment; beside models of the arm."""
+    """Return the paths in a part of objects whose numbers are parameters, or numbers of a segment; models excluded."""
     if not isinstance(part, Controller):
         return frozenset([""])
-    followed = part.references
-    pieces = (f"{name}.{attribute}" for name, each in followed.items() for attribute in each.polynomials if attribute)
-    return frozenset(["", *(each.path for each in part.parts), *followed, *pieces])
+    references = part.references
+    pieces = (f"{name}.{attribute}" for name, x in references.items() for attribute in x.polynomials if attribute)
+    return frozenset(["", *(block.path for block in part.parts), *references, *pieces])
 
 
 @final
 @dataclass
-class _Found:
-    """Descriptions of parts.
+class _Description:
+    """A description of parts in hashable values.
 
     Attributes:
-        part: The one that is described.
-        numbered: Paths in it to what has its numbers elsewhere.
-        objects: What stands in the descriptions by identity.
-        lasting: Whether these have definitions.
+        part: The part being described.
+        numbered: Paths in it of objects whose numbers are inputs of the code, see `_numbered`.
+        objects: Objects that are described by identity so far.
+        lasting: True if all of these have a source.
     """
 
     part: Any = None
@@ -95,7 +95,7 @@ class _Found:
     lasting: bool = True
 
     def of_part(self, part: Any) -> Any:
-        """A part in hashable values."""
+        """Return a part in hashable values."""
         self.part, self.numbered = part, _numbered(part)
         return self._of(part, "")
 
@@ -106,7 +106,7 @@ class _Found:
         if kind in _PLAIN:
             return kind.__name__, repr(value)  # -0.0 is another number than 0.0, and 1 than True
         if kind in (tuple, list):
-            return tuple(self._of(each, f"{path}.{i}") for i, each in enumerate(value))
+            return tuple(self._of(x, f"{path}.{i}") for i, x in enumerate(value))
         if issubclass(kind, np.generic) or (kind is np.ndarray and not value.dtype.hasobject):
             return value.dtype.str, value.shape, value.tobytes()
         robot = getattr(value, "robot", value)
@@ -119,35 +119,38 @@ class _Found:
             before = len(self.objects)
             name = kind.__qualname__ if of_library(kind) else self._by_identity(kind)
             described = name, *(self._of_field(value, name, path) for name in attributes(value))
-            if all(type(each).__weakrefoffset__ for each in self.objects[before:]):  # weak references identify them
+            if all(type(x).__weakrefoffset__ for x in self.objects[before:]):  # weak references to them are possible
                 return described
             del self.objects[before:]
         return self._by_identity(value)
 
     def _is_model(self, path: str) -> bool:
-        """Whether the numbers of a robot are among the parameters."""
+        """Return True if the numbers of the robot at a path are among the parameters."""
         return path in self.numbered or (isinstance(self.part, Controller) and path in self.part.models)
 
     def _by_identity(self, value: Any) -> tuple[str, str | None]:
+        """Return a value described by identity and, if possible, by its source."""
         self.objects.append(value)
-        defined = definition(value)
-        self.lasting &= defined is not None
-        return type(value).__name__, defined
+        source = definition(value)
+        self.lasting &= source is not None
+        return type(value).__name__, source
 
     def _of_field(self, part: Any, name: str, path: str) -> Any:
-        """A field of a part: of a parameter, whether it has a value, and the shape if it varies."""
+        """Return a field of a part; of a parameter, only True for None, or the shape if it may vary."""
         value: Any = getattr(part, name)
-        if name in ("period_s", "seed", "run") and of_library(type(part)):  # noise is drawn outside of machine code
+        if name in ("period_s", "seed", "run") and of_library(
+            type(part)
+        ):  # the time loop draws noise, not the traced equation
             return None
-        if name == "payload" and isinstance(part, CarriedPayload):  # its numbers are those of the bodies
+        if name == "payload" and isinstance(part, CarriedPayload):  # its numbers are parameters of the arm
             return "payload", value.frame
-        if name in (known := declared(type(part))) and path in self.numbered:
-            return value is None or (None if known[name].of_joints else np.shape(value))
+        if name in (coefficients := declared(type(part))) and path in self.numbered:
+            return value is None or (None if coefficients[name].of_joints else np.shape(value))
         return self._of(value, f"{path}.{name}" if path else name)
 
 
 def of_library(kind: type) -> bool:
-    """Whether the version of this library identifies the code of a class, in another process too."""
+    """Return True for a class of this library, whose version identifies its code also in another process."""
     return kind.__module__.startswith("robot_dyn.")
 
 
@@ -156,5 +159,5 @@ def _is_polynomial(value: Any) -> bool:
 
 
 def _of_edits(edits: Edits) -> tuple[Any, ...]:
-    frames = tuple(each.frame for each in edits.payloads)
+    frames = tuple(payload.frame for payload in edits.payloads)
     return edits.lock, frames, edits.armature, edits.mass_scale, edits.masses, edits.inertias

@@ -1,12 +1,12 @@
-"""The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, run_parameters).
+"""The state equation in symbols: the code of `StateEquation`, traced to functions of (t, y, p, run_parameters).
 
-    rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is recorded beside the state
-    bodies = (M, loads), where something may hold joints
-    in lock step rate = y', and actuation = u where it changes between ticks
+    rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = recorded quantities that are not in y
+    bodies = (M, loads) if an effect may hold joints
     jacobian = (∂y'/∂y₁, …, ∂y'/∂y_m, ∂y'/∂t)
+    in lock step: rate = y', and actuation = u if it changes between ticks
 
-p holds what all runs share on a segment: its ends, and the polynomials of the references. `run_parameters` differ from
-run to run: what a sampled controller holds, and the parameters.
+p are the numbers of a segment, which all runs share: its ends, and the polynomials of the references.
+`run_parameters` differ from run to run: the torques of a sampled controller in zero-order hold, and the parameters.
 """
 
 from __future__ import annotations
@@ -24,51 +24,53 @@ from robot_dyn.codegen.trace.symbolic_plant import Piece, symbolic_controller, s
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import call
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.dynamics.event import Event
-from robot_dyn.simulation.dynamics.moreau_jean import behind, problem, solution
+from robot_dyn.simulation.dynamics.moreau_jean import after_step, problem, solution
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.segment_table import BOUNDS, lengths, polynomials
 
-Bodies = Callable[[Any, Part], SymbolicDynamics]
+Bodies = Callable[[Dynamics, Part], SymbolicDynamics]
 
 
 def trace(
     equation: StateEquation,
-    bodies: Bodies,
-    known: Sequence[Parameter],
+    symbols_of: Bodies,
+    parameters: Sequence[Parameter],
     extras: tuple[str, ...] | None,
     jacobian: bool = False,
     nonsmooth: bool = False,
 ) -> dict[str, ca.Function]:
-    """The state equation as CasADi Functions: rate, energy, tick if it is sampled, sample, and jacobian if requested.
+    """Return the functions of a state equation, see `Functions`, as CasADi Functions by name.
 
     Args:
-        equation: What to trace.
-        bodies: Gives the symbols of a robot, the plant's or a model's.
-        known: The parameters.
-        extras: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose
-            samples hold y', u, K and V.
-        jacobian: Whether a method needs it.
-        nonsmooth: Whether the method needs the convex problem of each step in place of the rate.
+        equation: The state equation.
+        symbols_of: Function that returns the symbols of a robot, that of the plant or of a model.
+        parameters: Parameters of the functions.
+        extras: Which of "u", "v" and "energy" are in a sample of runs in lock step. None for a single run, whose
+            samples are y', u, K and V.
+        jacobian: True if the method needs the Jacobian.
+        nonsmooth: True if the method needs the convex problem of each step instead of the rate.
 
     Raises:
-        TraceError: If a part cannot be traced; names it.
+        TraceError: If a part cannot be traced; names the part.
     """
     n, held = equation.plant.dynamics.n, equation.plant.dynamics.n * equation.sampled
-    followed = polynomials(equation.controller)
-    sizes = 1, equation.size, BOUNDS + sum(map(lengths, followed)), held + sum(each.size for each in known)
+    references = polynomials(equation.controller)
+    sizes = 1, equation.size, BOUNDS + sum(map(lengths, references)), held + sum(x.size for x in parameters)
     (t, ts), (y, ys), (p, ps), (run_parameters, rs) = (
         inputs(name, size) for name, size in zip(("t", "y", "p", "own"), sizes, strict=True)
     )
     state, time = ys.view(Symbols), np.minimum(np.maximum(ts.view(Symbols), ps[:1]), ps[1:2])[0]
     with Symbolic().scope():
-        symbolic = _symbolic(equation, bodies, split(known, rs[held:].view(Symbols)), _pieces(followed, ps[BOUNDS:]))
-        held_here = rs[:held].view(Symbols) if equation.sampled else None
+        values, pieces = split(parameters, rs[held:].view(Symbols)), _pieces(references, ps[BOUNDS:])
+        symbolic = _symbolic(equation, symbols_of, values, pieces)
+        u_held = rs[:held].view(Symbols) if equation.sampled else None
         q, v, z, _ = symbolic.state(state)
         rate = np.full(equation.size, np.nan, dtype=object)
-        u = symbolic.actuation(time, q, v, z, held_here) if nonsmooth else None
+        u = symbolic.actuation(time, q, v, z, u_held) if nonsmooth else None
         if u is None:
-            rate, u = symbolic.rate(time, state, held_here)
+            rate, u = symbolic.rate(time, state, u_held)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energies(time, q, v)}
         single = extras is None
         results = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
@@ -78,11 +80,11 @@ def trace(
         if not single and (not equation.sampled or equation.equation_of_motion.bounds_at_all_times):
             results["actuation"] = parts["u"]
         if single and equation.impulses and not nonsmooth:
-            results["bodies"] = symbolic.bodies(time, state, held_here)
+            results["bodies"] = symbolic.bodies(time, state, u_held)
         if equation.events or equation.limited:
-            demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
-            values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]
-            results["events"] = np.concatenate(values)
+            demands = symbolic.demands(time, q, v, z, u_held, equation.limited)
+            levels = [_value(event, time, q, v) for event in equation.events]
+            results["events"] = np.concatenate([*(wide(demand, n) for demand in demands), *levels])
         if equation.sampled and symbolic.controller is not None:
             after = z[: equation.state_size]
             if equation.state_size:
@@ -90,62 +92,60 @@ def trace(
             results["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
         columns = {name: column(x) for name, x in results.items()}
         if jacobian:
-            # of the time before it is bounded: a segment goes on, for its derivatives
+            # by a time that is not clipped to the segment, so that the derivative at its ends is not 0
             unbounded, [free] = inputs("time", 1)
-            changing, _ = symbolic.rate(free, state, held_here)
+            changing, _ = symbolic.rate(free, state, u_held)
             J = ca.jacobian(column(changing), ca.vertcat(y, unbounded))
             columns["jacobian"] = ca.vec(ca.substitute(J, unbounded, column(time)))
-        given: dict[str, list[Any]] = {name: [t, y, p, run_parameters] for name in columns}
+        arguments: dict[str, list[Any]] = {name: [t, y, p, run_parameters] for name in columns}
         if nonsmooth:
             del columns["rate"]
-            for name, (arguments, x) in _of_step(symbolic, time, [t, p, run_parameters], held_here).items():
-                given[name], columns[name] = arguments, x
-    return {name: ca.Function("f", given[name], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
+            for name, (of_program, x) in _of_step(symbolic, time, [t, p, run_parameters], u_held).items():
+                arguments[name], columns[name] = of_program, x
+    return {name: ca.Function("f", arguments[name], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
 
 
 def _of_step(
     symbolic: StateEquation, time: Any, shared: list[Any], held: Array | None
 ) -> dict[str, tuple[list[Any], Any]]:
-    """Arguments and column of `problem`, `newton` and `behind`."""
+    """Return the arguments and the column of results of `problem`, `newton` and `after_step`."""
     n, (t, p, run_parameters) = symbolic.plant.dynamics.n, shared
     x, xs = inputs("x", symbolic.size + 1)
-    nothing = ca.SX.sym("nothing", 0)
-    given = problem(symbolic, time, xs.view(Symbols), held)
-    known, knowns = inputs("known", len(given))
-    place, places = inputs("place", n)
-    solved, solveds = inputs("solved", 2 * n + 1 + len(given))
-    step = (
-        solution(n, knowns.view(Symbols), places.view(Symbols)),
-        behind(symbolic, xs.view(Symbols), solveds.view(Symbols)),
-    )
+    empty = ca.SX.sym("empty", 0)
+    data = problem(symbolic, time, xs.view(Symbols), held)
+    numbers, numbers_array = inputs("numbers", len(data))
+    place, place_array = inputs("place", n)
+    solved, solved_array = inputs("solved", 2 * n + 1 + len(data))
+    newton = solution(n, numbers_array.view(Symbols), place_array.view(Symbols))
+    after = after_step(symbolic, xs.view(Symbols), solved_array.view(Symbols))
     return {
-        "problem": ([t, x, p, run_parameters], column(given)),
-        "newton": ([t, known, nothing, place], column(step[0])),
-        "behind": ([t, x, nothing, solved], column(step[1])),
+        "problem": ([t, x, p, run_parameters], column(data)),
+        "newton": ([t, numbers, empty, place], column(newton)),
+        "after_step": ([t, x, empty, solved], column(after)),
     }
 
 
 def _value(event: Event, t: Any, q: Array, v: Array) -> Array:
-    """The switching function of an event, (1,)."""
+    """Return the value of the switching function of an event, (1,)."""
     return whichever_way(f"event {event.name}", lambda: wide(call(event.function, t, q, v), 1))
 
 
-def _pieces(followed: Sequence[PiecewisePolynomial], p: Array) -> list[Piece]:
-    """The polynomials of a segment, from its numbers."""
-    ends = np.cumsum([0, *map(lengths, followed)])
-    return [Piece(p[a:b], each.n) for each, a, b in zip(followed, ends, ends[1:], strict=False)]
+def _pieces(references: Sequence[PiecewisePolynomial], p: Array) -> list[Piece]:
+    """Return the polynomials of the references on a segment, from the numbers p of the segment without its ends."""
+    ends = np.cumsum([0, *map(lengths, references)])
+    return [Piece(p[a:b], x.n) for x, a, b in zip(references, ends, ends[1:], strict=False)]
 
 
 def _symbolic(
-    equation: StateEquation, bodies: Bodies, values: dict[Part, dict[str, Any]], pieces: list[Piece]
+    equation: StateEquation, symbols_of: Bodies, values: dict[Part, dict[str, Any]], pieces: list[Piece]
 ) -> StateEquation:
-    """The same equation with symbols in place of its numbers."""
-    plant = symbolic_plant(equation.plant, bodies(equation.plant.dynamics, ROBOT).of(values.get(ROBOT, {})), values)
+    """Return the equation with symbols instead of its numbers."""
+    plant = symbolic_plant(equation.plant, symbols_of(equation.plant.dynamics, ROBOT).of(values.get(ROBOT, {})), values)
     controller = equation.controller
     if controller is not None:
         models = {}
         for name, model in controller.models.items():
             part = ("model", name)
-            models[name] = bodies(model, part).of(values.get(part, {}))
+            models[name] = symbols_of(model, part).of(values.get(part, {}))
         controller = symbolic_controller(controller, models, values, pieces)
     return StateEquation(plant, controller, equation.canonical, equation.events)

@@ -31,10 +31,10 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
         units: Units of q, v and u of each joint.
     """
     reference = _joint_reference(setup)
-    if reference is None or reference.start >= setup.duration_s:
+    if reference is None or reference.start_s >= setup.duration_s:
         return
     q, v = _along(setup, reference)
-    t, names = max(0.0, reference.start), setup.plant.dynamics.joint_names
+    t, names = max(0.0, reference.start_s), setup.plant.dynamics.joint_names
     before = (q0, v0) if t == 0 else (np.broadcast_to(reference.at(0.0)[0], q0.shape), np.zeros_like(v0))
     sizes = np.ptp(q, axis=0), np.abs(v).max(axis=0)
     for row, (quantity, begin, there, size) in enumerate(zip("qv", reference.at(t), before, sizes, strict=False)):

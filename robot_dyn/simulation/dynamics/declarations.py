@@ -1,11 +1,11 @@
-"""What the parts of a setup declare: where their formulas are smooth, and that nothing in them changes during a run.
+"""Declarations by the parts of a setup: where their formulas are smooth, and that a run does not change them.
 
-    effect, controller    `thresholds`, () where it is smooth everywhere
-    block                 `rounds`: whether its output jumps
-    reference             `knots`, beside its own `at`
+    effect, controller    `thresholds`, () if it is smooth everywhere
+    block                 `rounds`, True if its output jumps
+    reference             `knots`, if it defines `at`
 
-A part that declares this may be compiled unasked, and methods keep their order between its thresholds. Nothing is
-presumed of any other part, whoever wrote it.
+engine="auto" compiles only parts with these declarations; methods keep their order between the thresholds. Nothing is
+assumed about any other part.
 """
 
 from __future__ import annotations
@@ -29,31 +29,30 @@ from robot_dyn.model.robot import Robot
 _CHANGING = list, dict, set, bytearray
 
 
-def undeclared(plant: Plant, controller: Controller | None) -> tuple[tuple[Any, str], ...]:
-    """Parts that do not declare what they must, each with what to declare."""
+def undeclared(plant: Plant, controller: Controller | None) -> tuple[tuple[object, str], ...]:
+    """Return the parts that lack a declaration, each with a text: the declaration that is missing and the remedy."""
     parts = [*plant.effects]
     if controller is not None:
-        parts += [controller, *(each.part for each in controller.parts), *controller.references.values()]
-    found = [(part, _missing(part)) for part in parts]
-    bodies = [plant.dynamics, *(controller.models.values() if controller is not None else ())]
-    found += [(each, _of_no_file(each)) for each in bodies]
-    return tuple((part, why) for part, why in found if why)
+        parts += [controller, *(block.part for block in controller.parts), *controller.references.values()]
+    models = [plant.dynamics, *(controller.models.values() if controller is not None else ())]
+    pairs = [(part, _missing(part)) for part in parts] + [(model, _of_no_file(model)) for model in models]
+    return tuple((part, missing) for part, missing in pairs if missing)
 
 
-def named(part: Any) -> str:
-    """Its name for people: that of its class, or of the function that it is."""
+def named(part: object) -> str:
+    """Return the name of a part in messages: its class; for a controller of a function, the name of the function."""
     return part.name if isinstance(part, Controller) else type(part).__name__
 
 
-def is_frozen(part: Any) -> bool:
-    """Whether all its attributes are fields of a frozen dataclass; what follows from these may be cached."""
+def is_frozen(part: object) -> bool:
+    """Return True if all attributes are fields of a frozen dataclass; values derived from these may be cached."""
     return next(_not_frozen(part), None) is None
 
 
-def is_value(part: Any) -> bool:
-    """Whether nothing can change what a part is: a value of this library, as is all that it holds.
+def is_value(part: object) -> bool:
+    """Return True if a part cannot change: it is a value of this library, and so are all its attributes.
 
-    A robot with a check of its answers is none: it is to warn in each run.
+    False for a robot with a check of its results, because each run must warn again.
     """
     if isinstance(part, tuple):
         return all(map(is_value, part))
@@ -65,12 +64,12 @@ def is_value(part: Any) -> bool:
         return False
     if isinstance(part, Robot):
         return part.answer_check is None
-    caches = {each.name for each in fields(part) if not each.compare}
+    caches = {field.name for field in fields(part) if not field.compare} if is_dataclass(part) else set()
     return all(is_value(getattr(part, x)) for x in attributes(part) if x not in caches)
 
 
 def _missing(part: Any) -> str:
-    """What a part still has to declare; empty if nothing."""
+    """Return the declaration that a part lacks, with the remedy; empty if it lacks none."""
     kind = type(part)
     if isinstance(part, Effect) and not _defines(kind, "thresholds", Effect):
         return "declares no thresholds: define thresholds(self, n), which returns () if it is smooth everywhere"
@@ -86,40 +85,41 @@ def _missing(part: Any) -> str:
     if name := next(_not_frozen(part), ""):
         return f"may change its attribute {name!r} in a run: make it a frozen dataclass, with that as a field"
     if name := next((name for name in attributes(part) if isinstance(getattr(part, name, None), _CHANGING)), ""):
-        return f"may change what its attribute {name!r} holds: make that a tuple or an array, or declare states"
+        return f"may change the content of its attribute {name!r}: make that a tuple or an array, or declare states"
     return ""
 
 
 def _of_no_file(dynamics: Any) -> str:
+    """Return the message for dynamics that are not those of a `Robot`; empty for a `Robot`."""
     robot = getattr(dynamics, "robot", dynamics)
     return "" if isinstance(robot, Robot) else "comes from no robot's file: give a Robot"
 
 
-def attributes(part: Any) -> tuple[str, ...]:
-    """Names of the attributes that it depends on; what is cached follows from them."""
-    follows = cached_properties(part)
-    own = (name for name in getattr(part, "__dict__", ()) if name not in follows)
-    return tuple(dict.fromkeys([*_fields(type(part)), *own]))
+def attributes(part: object) -> tuple[str, ...]:
+    """Return the names of the attributes that a part depends on: all but its cached properties."""
+    derived = cached_properties(part)
+    others = (name for name in getattr(part, "__dict__", ()) if name not in derived)
+    return tuple(dict.fromkeys([*_fields(type(part)), *others]))
 
 
 def _fields(kind: type) -> tuple[str, ...]:
-    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else ()
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
 
 
 def _not_frozen(part: Any) -> Iterator[str]:
-    """Attributes that code may set after construction; the period of a controller is set by its interface."""
+    """Yield the attributes that code may set after construction; the interface `Controller` sets those it declares."""
     kind = type(part)
-    frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen  # pyright: ignore[reportAttributeAccessIssue]
-    known = set(_fields(kind)) if frozen else set()
-    known |= vars(Controller)["__annotations__"].keys() if isinstance(part, Controller) else set()
-    return (name for name in attributes(part) if name not in known)
+    is_frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen  # pyright: ignore[reportAttributeAccessIssue]
+    constant = set(_fields(kind)) if is_frozen else set()
+    constant |= vars(Controller)["__annotations__"].keys() if isinstance(part, Controller) else set()
+    return (name for name in attributes(part) if name not in constant)
 
 
 def _defines(kind: type, name: str, base: type) -> bool:
-    """Whether a class, or one between it and an interface, has a definition of its own."""
+    """Return True if a class, or one between it and the interface `base`, defines the attribute `name`."""
     return _definer(kind, name) < kind.__mro__.index(base)
 
 
 def _definer(kind: type, name: str) -> int:
-    """The number of the class, in the order of inheritance, whose definition counts."""
-    return next((i for i, each in enumerate(kind.__mro__) if name in vars(each)), len(kind.__mro__))
+    """Return the place, in the order of inheritance, of the class whose definition of `name` applies."""
+    return next((i for i, base in enumerate(kind.__mro__) if name in vars(base)), len(kind.__mro__))

@@ -1,11 +1,13 @@
-"""Events: a function of the user that a run watches, and what happened in a run."""
+"""Events: switching functions of the user, and the events that occurred in a run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from inspect import signature
-from typing import Any, final
+from typing import final
+
+import numpy as np
 
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import instance, truth
@@ -18,20 +20,21 @@ _DIRECTIONS = (-1, 0, 1)
 class Event:
     """A user-defined event: g(t, q, v) = 0.
 
-    A step of integration ends there. Within a step g is evaluated at its eighths on the dense output, and its least
-    value near 0 is searched, so that g may pass 0 twice between two of them; two minima there may be missed.
+    A step of integration ends at the event. Within a step, g is evaluated on the dense output at each eighth, and a
+    minimum of |g| near 0 is searched for. So g may cross 0 twice between two eighths; a second minimum between them
+    may be missed.
 
     Attributes:
         function: g, a function of (t, q, v) that returns a number.
-        direction: 1 if only growing g counts, −1 if only falling g does, 0 for both.
-        terminal: Whether the run ends there.
-        name: For messages; that of the function unless given.
+        direction: 1 for crossings with growing g only, −1 with falling g only, 0 for both.
+        terminal: True to end the run at the event.
+        name: Name for messages; by default the name of the function.
 
     Raises:
         QueryError: If the function does not take three arguments, or an option is not allowed.
     """
 
-    function: Callable[[Any, Any, Any], Any] = field(repr=False)
+    function: Callable[[float, np.ndarray, np.ndarray], float | np.floating] = field(repr=False)
     direction: int = 0
     terminal: bool = False
     name: str = ""
@@ -47,7 +50,7 @@ class Event:
             signature(self.function).bind(0.0, None, None)
         except TypeError:
             raise QueryError(f"event {self.function!r}: give a function of (t, q, v)") from None
-        except ValueError:  # of some functions written in C the arguments are not known
+        except ValueError:  # the arguments of some functions written in C are unknown
             pass
         if not self.name:
             object.__setattr__(self, "name", getattr(self.function, "__name__", type(self.function).__name__))
@@ -56,15 +59,15 @@ class Event:
 @final
 @dataclass(frozen=True)
 class Occurrence:
-    """An event of a run.
+    """An event that occurred in a run.
 
     Attributes:
-        t: When, in [s].
-        name: What happened, as "upper stop of panda_joint2 touched" or the name of the user's event.
-        direction: 1 where the switching function grows, −1 where it falls.
-        q: Position then, n numbers, in [rad] or [m].
-        v: Velocity then, in [rad/s] or [m/s].
-        joint: The joint that it is of; empty for a user-defined event.
+        t: Time of the event, in [s].
+        name: A phrase such as "upper stop of panda_joint2 touched", or the name of the user-defined event.
+        direction: 1 if the switching function grows, −1 if it falls.
+        q: Position at the event, n numbers, in [rad] or [m].
+        v: Velocity after the event, n numbers, in [rad/s] or [m/s].
+        joint: Name of the joint of the event; empty for a user-defined event.
     """
 
     t: float

@@ -1,9 +1,9 @@
-"""The fastest motion of a system: the largest eigenvalue of its Jacobian, the joint and the effect it is due to.
+"""The fastest motion of a system: the largest eigenvalue of its Jacobian, with the joint and the effect that cause it.
 
     J x = λ x,   wᴴ J = λ wᴴ,   λ = Σ_k λ_k with λ_k = wᴴ (∂f_k/∂y) x / wᴴ x
 
-f_k is what a force or the control adds to the state equation; the rest is that of the rigid bodies. |w_i x_i| / |wᴴ x|
-is the participation of entry i. [Hairer, Wanner 1996, IV.1; Pérez-Arriaga, Verghese, Schweppe 1982]
+f_k is the part of the state equation due to a force or the control; the rest is due to the rigid bodies. The
+participation of entry i is |w_i x_i| / |wᴴ x|. [Hairer, Wanner 1996, IV.1; Pérez-Arriaga, Verghese, Schweppe 1982]
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
 _FASTEST = "the fastest motion {motion} with {rate_per_s:.3g} per second, of joint {moving_joint!r}, by "
-MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "nothing acts back on the motion of {moving_joint!r}"
+MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "no force acts back on the motion of {moving_joint!r}"
 """The sentence about the fastest motion, from `Fastest.facts`."""
 
 
@@ -33,7 +33,7 @@ class Fastest:
     Attributes:
         eigenvalue: λ, in [1/s].
         joint: Name of the joint that takes part most.
-        source: Name of the effect or of the control whose λ_k is the largest; BODIES if none is.
+        source: Name of the effect or of the control whose λ_k is the largest; BODIES if that of the bodies is.
     """
 
     eigenvalue: complex
@@ -42,7 +42,7 @@ class Fastest:
 
     @property
     def decays(self) -> bool:
-        """Whether it decays more than it oscillates."""
+        """True if the motion decays faster than it oscillates."""
         return -self.eigenvalue.real > abs(self.eigenvalue.imag)
 
     @property
@@ -59,7 +59,7 @@ class Fastest:
 
 
 def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
-    """∂y'/∂y without the works, which do not act back, by differences.
+    """Return ∂y'/∂y by differences, without the rows and columns of the works, on which y' does not depend.
 
     Args:
         equation: The state equation.
@@ -72,33 +72,33 @@ def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) ->
 
 
 def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, oscillation: bool = False) -> Fastest:
-    """The fastest motion near a state, by differences of the interpreted equation.
+    """Return the fastest motion near a state, by differences of the interpreted equation.
 
     Args:
         equation: The state equation, in (q, v).
         t: Time, in [s].
         y: State, (m,).
         held: The actuation in zero-order hold, or None.
-        oscillation: Whether to pass over what decays more than it oscillates.
+        oscillation: True to leave out motions that decay faster than they oscillate.
 
     Raises:
-        RobotDynError: If the equation has no answer near the state.
-        numpy.linalg.LinAlgError: If its eigenvalues are not found, or nothing oscillates.
+        RobotDynError: If the equation cannot be evaluated near the state.
+        numpy.linalg.LinAlgError: If the eigenvalues do not converge, or no motion oscillates.
     """
     n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
     values, right = np.linalg.eig(J)
-    among = np.abs(np.imag(values)) > np.abs(np.real(values)) if oscillation else np.full(len(values), True)
-    if not among.any():
-        raise np.linalg.LinAlgError("nothing oscillates")
-    k = int(np.argmax(np.where(among, np.abs(values), -1.0)))
+    counts = np.abs(np.imag(values)) > np.abs(np.real(values)) if oscillation else np.full(len(values), True)
+    if not counts.any():
+        raise np.linalg.LinAlgError("no motion oscillates")
+    k = int(np.argmax(np.where(counts, np.abs(values), -1.0)))
     x = right[:, k]
     others, left = np.linalg.eig(J.T)
     w = left[:, np.argmin(np.abs(others - values[k]))]
-    if values[k] == 0:  # as of a joint in free flight
+    if values[k] == 0:  # for example of a joint that moves freely
         return Fastest(0j, equation.plant.dynamics.joint_names[int(np.argmax(np.abs(x[:n])))], BODIES)
     part = np.abs(w * x)
     joint = int(np.argmax(part[:n] + part[n : 2 * n]))
-    with np.errstate(all="ignore"):  # times wᴴ x, which is 0 where λ is defective, as of critical damping
+    with np.errstate(all="ignore"):  # all times wᴴ x, which is 0 for a defective λ, as with critical damping
         parts = {name: w[n : 2 * n] @ (A @ x) for name, A in _accelerations(equation, t, y, held).items()}
         kinematic = w[:n] @ (J[:n] @ x)  # q' = v, half of every oscillation
         parts[BODIES] = values[k] * (w @ x) - kinematic - sum(parts.values())
@@ -107,17 +107,18 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, 
 
 
 def _accelerations(equation: StateEquation, t: float, y: Array, held: Array | None) -> dict[str, Array]:
-    """M⁻¹ ∂τ_k/∂(q, v, z) of the control and of each force, (n, 2 n + z), by name."""
+    """Return M⁻¹ ∂τ_k/∂(q, v, z) of the control and of each force, (n, 2 n + z), by name."""
     n, M = equation.plant.dynamics.n, equation.plant.M(y[: equation.plant.dynamics.n])
     size = 2 * n + equation.states
-    made = {}
+    accelerations = {}
     for k, name in enumerate(numbered(CONTROL, *(force.name for force in equation.plant.forces))):
         torque = rowwise(lambda x, k=k: _torque(equation, k, t, x, held))
-        made[name] = np.linalg.solve(M, by_state(torque, t, y[:size], equation.widths[:size]).T)
-    return made
+        accelerations[name] = np.linalg.solve(M, by_state(torque, t, y[:size], equation.widths[:size]).T)
+    return accelerations
 
 
 def _torque(equation: StateEquation, k: int, t: float, x: Array, held: Array | None) -> Array:
+    """Return the torque of the control, k = 0, or of force k − 1 at x = (q, v, z), (n,)."""
     n = equation.plant.dynamics.n
     q, v, z = x[:n], x[n : 2 * n], x[2 * n :]
     if k == 0:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,7 @@ from robot_dyn.queries.units import without_rounding
 from robot_dyn.simulation.dynamics.smooth_differences import ROUNDING, Column
 
 _AT_REST = 1e-9  # part of the sum of magnitudes of the terms of a rate
-_SOLVED = 1e-12  # part of the largest entry of x that the solution of a linear system may miss in any other
+_SOLVED = 1e-12  # of the largest entry of x: error of the other entries in the solution of a linear system
 _LAYER = 20  # widths from v = 0 within which steps resolve a layer of friction
 _ITERATIONS = 60
 _NEAR = 1e-6  # of a threshold that is named as the cause of a kink
@@ -76,8 +76,8 @@ class Linearisation(Answer, Value):
         yield f"d/dt {(x := 'δx' if others else '(δq, δv)')} = A {x} + B δu: A {self.A.shape}, B {self.B.shape}"
         if others:
             yield f"x = (q, v, {', '.join(others)})"
-        found = [x for x in np.linalg.eigvals(self.A).tolist() if complex(x).imag >= 0]
-        rows = sorted((complex(x) for x in found), key=lambda x: (-x.real, x.imag))
+        upper = [x for x in np.linalg.eigvals(self.A).tolist() if complex(x).imag >= 0]
+        rows = sorted((complex(x) for x in upper), key=lambda x: (-x.real, x.imag))
         headings = ("growth, real part [1/s]", "± imaginary part [rad/s]")
         yield "eigenvalues of A:"
         shown = without_rounding([(x.real, x.imag) for x in rows])
@@ -101,8 +101,8 @@ def linearise(
         v: Velocity, shape (n,), in [rad/s] or [m/s]; 0 by default.
         u: Actuation, shape (n,), in [N m] or [N]; by default the actuation at which the acceleration is 0, so that a
             state at rest is an equilibrium.
-        z: States of the effects that have some, in the order of the plant; by default those at which ż = 0. States
-            that nothing drives at this q and v keep their value at the start of a run, such as bristles at rest.
+        z: States of the effects with states, in the order of the plant; by default those at which ż = 0. A state with
+            ż = 0 at any value, such as a bristle at rest, keeps its value at the start of a run.
         t: Time, in [s]; required if an effect depends on the time.
 
     Returns:
@@ -110,8 +110,8 @@ def linearise(
         eigenvalues of A.
 
     Raises:
-        QueryError: If an argument is wrong, the acceleration has no derivative at this state, or no u and z make the
-            rates 0 where they are not given.
+        QueryError: If an argument is wrong, the acceleration has no derivative at this state, or no values of the
+            arguments u and z that are left out make the rates 0.
     """
     plant = (plant if isinstance(plant, Plant) else Plant(plant)).at(t)
     time = MISSING_TIME if t is None else float(t)
@@ -254,7 +254,7 @@ def _balanced(rates: _Rates, x: np.ndarray, unknown: np.ndarray) -> np.ndarray:
             return x
         slopes = _slopes(rates, x, unknown).values
         driven = unknown.copy()
-        driven[2 * n : -n] &= (slopes[n:] != 0).any(axis=1)  # a state that nothing drives keeps its value
+        driven[2 * n : -n] &= (slopes[n:] != 0).any(axis=1)  # a state whose rate is constant keeps its value
         x = x.copy()
         x[driven] -= np.linalg.lstsq(slopes[np.ix_(wanted, driven)], residual[wanted], rcond=None)[0]
     if not rates.equation.state_size:
@@ -275,25 +275,25 @@ class _Slopes(NamedTuple):
     first_bad: int | None
 
 
-def _slopes(rates: _Rates, x: np.ndarray, which: Any = True) -> _Slopes:
-    """Return ∂(a, ż)/∂x, (n + size, m), by the entries of x that are chosen; 0 by the others."""
-    columns = np.flatnonzero(np.broadcast_to(which, x.shape))
+def _slopes(rates: _Rates, x: np.ndarray, is_needed: np.ndarray | bool = True) -> _Slopes:
+    """Return ∂(a, ż)/∂x, (n + size, m), by the needed entries of x; 0 by the others."""
+    needed = np.flatnonzero(np.broadcast_to(is_needed, x.shape))
     here, longest = rates(x), rates.longest_steps(x)
-    made = {j: Column.of(rates, x, j, here, longest[j]) for j in columns.tolist()}
+    columns = {j: Column.of(rates, x, j, here, longest[j]) for j in needed.tolist()}
     values = np.zeros((len(here), len(x)))
     rounding = ROUNDING * rates.magnitudes(x, values)
-    for _ in range(2):  # the second time with the rounding that the slopes show
-        for j, column in made.items():
+    for _ in range(2):  # the second time with the rounding from the slopes of the first
+        for j, column in columns.items():
             values[:, j] = column.best(rounding)[0]
         rounding = ROUNDING * rates.magnitudes(x, values)
-    bad = (j for j, column in made.items() if not column.is_smooth(rounding))
+    bad = (j for j, column in columns.items() if not column.is_smooth(rounding))
     return _Slopes(values, next(bad, None))
 
 
 def _cause(rates: _Rates, x: np.ndarray) -> str:
     """Return the thresholds of effects that the state lies on, in words."""
     q, v, z, u = rates.parts(x)
-    equation, found = rates.equation, []
+    equation, causes = rates.equation, []
     _, reached = equation.applied(u, z, range(len(equation.effects)))
     for k, effect in enumerate(equation.effects):
         for threshold in effect.thresholds(len(q)):
@@ -304,5 +304,5 @@ def _cause(rates: _Rates, x: np.ndarray) -> str:
                 values = reached[k]
             if abs(values[i] - threshold.level) <= max(threshold.slack, _NEAR * max(1.0, abs(threshold.level))):
                 joint = equation.dynamics.joint_names[threshold.joint]
-                found.append(f"{effect.name} switches at {threshold.name} {threshold.level:.6g} of {joint}")
-    return " and ".join(dict.fromkeys(found)) or "an effect jumps or has a kink there"
+                causes.append(f"{effect.name} switches at {threshold.name} {threshold.level:.6g} of {joint}")
+    return " and ".join(dict.fromkeys(causes)) or "an effect jumps or has a kink there"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from math import inf
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,13 +15,15 @@ from robot_dyn.integrate.primitives import below
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 _FIRST = np.zeros(1, np.int64)
+Function = Callable[..., None] | int
+"""A function of (t, y, p, run_parameters, out): a Python function, the address of machine code, or 0 for none."""
 
 
 class Ended(IntEnum):
     """The reason for which a time loop returned."""
 
     DONE = 0
-    PAUSED = 1  # its budget of steps is spent
+    PAUSED = 1  # the budget of steps is used up
     NEEDS_REVIEW = 2  # the next step needs a check; y is the state before it
     TICK = 3  # the torque of the controller is not finite
     ENERGY_GROWS = 4  # energy may grow without a source; y is the state after the step
@@ -95,30 +98,30 @@ def start_position(sample_time: float = 0.0) -> Position:
 
 
 class Functions(NamedTuple):
-    """Functions of the state equation for `evaluate`, called by steps and time loops.
+    """Functions of the state equation for `evaluate`, called by steps and time loops; 0 for those that are not needed.
 
     Attributes:
         rate: y'; for a single run also u.
-        tick: Run parameters after a tick.
-        energy: K and V.
-        sample: Contents of a sample.
+        tick: Actuation of the controller until the next tick, and its next states.
+        energy: K and V, in [J].
+        sample: Numbers of a sample.
         jacobian: See `RightSide`.
-        events: Values of the events.
-        step, behind: See `RightSide`.
+        events: Torques that reach limited parts, then values of user-defined events; see `event_values`.
+        step, after_step: See `RightSide`.
         actuation: u, for runs in lock step where u changes between ticks.
         bodies: Mass matrix and loads, if joints may be held; see `bodies`.
     """
 
-    rate: Any
-    tick: Any
-    energy: Any
-    sample: Any
-    jacobian: Any = 0
-    events: Any = 0
-    step: Any = 0
-    behind: Any = 0
-    actuation: Any = 0
-    bodies: Any = 0
+    rate: Function
+    tick: Function
+    energy: Function
+    sample: Function
+    jacobian: Function = 0
+    events: Function = 0
+    step: Function = 0
+    after_step: Function = 0
+    actuation: Function = 0
+    bodies: Function = 0
 
 
 class Lanes(NamedTuple):
@@ -132,7 +135,8 @@ class Lanes(NamedTuple):
         inner: State within a step, (m, W).
         sampled, command, u, energies, size: Workspace for a sample, a tick, the actuation, K and V, and Σ |y⁺|.
         alive: 1 while the run continues, (W,).
-        reason, end_time, end_state: Why, when and in which state the run ended, (W,), (W,) and (m, W); see `LaneEnd`.
+        reason: Reason for which the run ended, see `LaneEnd`, (W,).
+        end_time, end_state: Time, in [s], and state at its end, (W,) and (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|, (W,).
         peak: Largest K at the energy checks, (W,).
         keys: Seed and number of each run, which determine its noise, (2, W), as uint64.
@@ -165,7 +169,7 @@ class LoopConfig(NamedTuple):
     Attributes:
         n, works: Number of joints, and number of works at the end of y.
         states: Number of controller states, which follow q and v.
-        held: Number of torques in the zero-order hold of a sampled controller; 0 otherwise.
+        held: Number of torques in zero-order hold: n with a sampled controller, else 0.
         instants, acting: Ticks per controller period, and the index of the one at which the torque changes.
         deviates: Number of trailing controller states that are redrawn before each tick.
         canonical: True if y has momenta instead of velocities.
@@ -173,12 +177,12 @@ class LoopConfig(NamedTuple):
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
         every, thin: Steps between states that may be shared, 0 for none; and how many of these to one that is stored.
         base: Column of the first run in the records.
-        apart: Steps between observations of u in lock step; 0 if u is held between ticks.
-        sample_period, sample_slack: Time between samples, and by how much one may be early, in [s].
+        apart: Steps between observations of u in lock step; 0 if u is constant between ticks.
+        sample_period, sample_slack: Time between samples, and the time by which a sample may be early, in [s].
         share_period: Time between shared states, of a loop with events, in [s]; inf for none.
         samples_nodes, samples_steps: True for a sample at the start of each segment, and at the end of each step.
         duration: End of the run, in [s].
-        restarts: True if the first step after an event is chosen again.
+        restarts: True if the method chooses its step again after an event.
     """
 
     n: int
@@ -204,8 +208,8 @@ class LoopConfig(NamedTuple):
     restarts: bool = False
 
 
-def loop_config(equation: StateEquation, alone: bool, **settings: Any) -> LoopConfig:
-    """Return the settings of a loop over a state equation; `settings` are fields of `LoopConfig` with a default."""
+def loop_config(equation: StateEquation, alone: bool) -> LoopConfig:
+    """Return the settings of a loop over a state equation; the fields of `LoopConfig` with a default have it."""
     n, controller = equation.plant.dynamics.n, equation.controller
     return LoopConfig(
         n=n,
@@ -217,7 +221,6 @@ def loop_config(equation: StateEquation, alone: bool, **settings: Any) -> LoopCo
         deviates=0 if controller is None else controller.deviates,
         canonical=equation.canonical,
         alone=alone,
-        **settings,
     )
 
 
@@ -248,7 +251,7 @@ def lanes_of(
     keys[1] += np.uint64(run)
     rows = {"inner": m, "end_state": m, "sampled": sampled, "u": n, "energies": 2}
     rows["command"] = n * equation.sampled + equation.state_size
-    of_runs = "size", "end_time", "energy", "peak"
+    scalars = "size", "end_time", "energy", "peak"
     return Lanes(
         y=start,
         after=after,
@@ -260,7 +263,7 @@ def lanes_of(
         scale=np.ones(W),
         keys=keys,
         **{name: np.zeros((count, W)) for name, count in rows.items()},
-        **dict(zip(of_runs, np.zeros((len(of_runs), W)), strict=True)),
+        **dict(zip(scalars, np.zeros((len(scalars), W)), strict=True)),
     )
 
 

@@ -27,10 +27,10 @@ from robot_dyn.simulation.dynamics.fastest_motion import jacobian
 from robot_dyn.simulation.dynamics.stability import NO_BOUND, STILL, Growth, Stability, first_unstable, growth, lengths
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
-_NOISE = 1e-10  # of an entry of the map, by differences; and, in [1/s], of an entry of A that should be 0
+_NOISE = 1e-10  # relative error of an entry of the map by differences; in [1/s], error of an entry of A that is 0
 _ROUNDING = 1e-15
-_LEAST_OF_STATES = 1e-3  # first period tried times the fastest rate, with z: errors of L_z do not shrink with it
-_FADES = 1.03  # at a period longer by this factor, growth is ten times its doubt, unless it fades as a power of it
+_LEAST_OF_STATES = 1e-3  # h |λ| of the first period tried with z, as the errors of L_z do not shrink with the period
+_FADES = 1.03  # factor on a limit: at this period the growth is ten times its error if it begins at the limit
 
 
 @final
@@ -53,7 +53,7 @@ class SampledLoop:
     stateless: bool
 
     def growth(self, period_s: float) -> Growth:
-        """Return the growth of deviations in a cycle; unbounded if the loop is undefined at the period (a filter)."""
+        """Return the growth of deviations in a cycle; NO_BOUND if the loop, such as a filter, has no such period."""
         try:
             with np.errstate(all="ignore"):
                 matrix = self.matrix(period_s)
@@ -76,9 +76,9 @@ class SampledLoop:
         return fastest if fastest > STILL * max(1.0, float(np.abs(rates).max())) else 0.0
 
     def longest_period(self, also: float = 0.0) -> float:
-        """Return the period up to which the loop is stable, in [s]; inf if every period is, 0 if none is.
+        """Return the period up to which the loop is stable, in [s]; inf if it always is, 0 if it never is.
 
-        Delays are the same number of periods at each. The loop may be stable again at longer periods.
+        A delay has the same number of periods at all periods. The loop may be stable again at longer periods.
 
         Args:
             also: Another period to try, in [s]; 0 for none.
@@ -104,7 +104,7 @@ class SampledLoop:
         return sorted([*tried, also]) if also else tried
 
     def _crosses(self, limit: float) -> bool:
-        """Return True if growth begins at a limit; otherwise shorter periods grow too, less than can be detected."""
+        """Return True if growth begins at a limit; False if shorter periods grow, too, by less than can be detected."""
         if not limit or self.growth(limit / 1.1).most < 0:
             return limit > 0
         beyond = self.growth(limit * _FADES)
@@ -134,7 +134,7 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> Samp
     n, size, free = plant.dynamics.n, continuous.state_size, StateEquation(plant, None).in_a_mode
     law = y[: 2 * n + size]
     x = np.concatenate([y[: 2 * n], y[2 * n + size :], np.zeros(len(free.sources))])
-    u = _law(continuous, continuous.torque, t, n)(t, law)
+    u = _law(continuous.torque, t, n)(t, law)
     A = jacobian(free, t, x, u)
     m = len(A)
     B = by_state(rowwise(lambda torque: free.rate(t, x, torque)[0][:m]), t, u).T
@@ -160,12 +160,12 @@ def _at_all_times(A: Array, B: Array, controller: Controller, t: float, law: Arr
     m, n, size = len(A), B.shape[1], controller.state_size
     J = np.zeros((m + size, m + size))
     J[:m, :m] = A
-    of_u = by_state(_law(controller, controller.torque, t, n), t, law).T
-    J[:m, : 2 * n] += B @ of_u[:, : 2 * n]
+    K = by_state(_law(controller.torque, t, n), t, law).T
+    J[:m, : 2 * n] += B @ K[:, : 2 * n]
     if size:
-        of_z = by_state(_law(controller, controller.state_rate, t, n), t, law).T
-        J[:m, m:] = B @ of_u[:, 2 * n :]
-        J[m:, : 2 * n], J[m:, m:] = of_z[:, : 2 * n], of_z[:, 2 * n :]
+        L = by_state(_law(controller.state_rate, t, n), t, law).T
+        J[:m, m:] = B @ K[:, 2 * n :]
+        J[m:, : 2 * n], J[m:, m:] = L[:, : 2 * n], L[:, 2 * n :]
     return J
 
 
@@ -177,20 +177,20 @@ def _between(flow: Array, size: int) -> Array:
 
 
 def _tick(controller: Controller, t: float, joints: Array, z: Array, m: int) -> Array:
-    """Return the map of (x, u, z) at a tick, with x constant: m entries, of which `joints` are the first, (q, v)."""
+    """Return the map of (x, u, z) at a tick, which leaves x (m,) unchanged; `joints` are (q, v), its first entries."""
     n = len(joints) // 2
     law = np.concatenate([joints, z])
-    of_u = by_state(_law(controller, controller.torque, t, n), t, law).T
+    K = by_state(_law(controller.torque, t, n), t, law).T
     matrix = np.eye(m + n + len(z))
     matrix[m : m + n] = 0
-    matrix[m : m + n, : 2 * n], matrix[m : m + n, m + n :] = of_u[:, : 2 * n], of_u[:, 2 * n :]
+    matrix[m : m + n, : 2 * n], matrix[m : m + n, m + n :] = K[:, : 2 * n], K[:, 2 * n :]
     if len(z):
-        of_z = by_state(_law(controller, controller.next_state, t, n), t, law).T
+        L = by_state(_law(controller.next_state, t, n), t, law).T
         matrix[m + n :] = 0
-        matrix[m + n :, : 2 * n], matrix[m + n :, m + n :] = of_z[:, : 2 * n], of_z[:, 2 * n :]
+        matrix[m + n :, : 2 * n], matrix[m + n :, m + n :] = L[:, : 2 * n], L[:, 2 * n :]
     return matrix
 
 
-def _law(controller: Controller, function: Callable[..., Any], t: float, n: int) -> Callable[[Any, Array], Array]:
-    """Return a function of a controller, for rows (q, v, z)."""
+def _law(function: Callable[..., Any], t: float, n: int) -> Callable[[Any, Array], Array]:
+    """Return a function of a controller at time t, as a function of rows (q, v, z)."""
     return rowwise(lambda row: call(function, t, row[:n], row[n : 2 * n], row[2 * n :]))

@@ -1,4 +1,4 @@
-"""Derivatives of smooth rates by differences at many steps; the one with the least error is taken.
+"""Derivatives of smooth rates by differences at many steps, of which the most accurate is used.
 
 The change from one step to the next shows the truncation, and the slopes of both sides show a kink; the rounding of
 the rates is an argument. [Press et al., Numerical Recipes, 3rd ed., 2007, sec. 5.7]
@@ -13,10 +13,10 @@ from typing import final
 import numpy as np
 
 _STEPS = 0.5 ** np.arange(3, 45)
-_AGREE = 1e-6  # part of the largest slope of a column: a larger truncation does not show a derivative
-_HIDDEN = 1e-3  # part of the largest slope that any step shows: a larger rounding hides the derivative
-_DOUBT = 1e5  # times the largest rounding of the rates, per unit: a smaller one of a slope does not hide it
-_ONE_SIDED = 0.01  # part of a slope: a larger difference between its two sides is a kink
+_AGREE = 1e-6  # of the largest slope of a column: with a larger truncation there is no derivative
+_HIDDEN = 1e-3  # of the largest slope at any step: a larger rounding hides the derivative
+_DOUBT = 1e5  # of the largest rounding of the rates, per unit: a smaller rounding of a slope does not hide it
+_ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is a kink
 ROUNDING = 4 * np.finfo(float).eps
 """Rounding of a rate, as a part of the sum of magnitudes of its terms."""
 
@@ -27,10 +27,10 @@ class Column:
     """Differences of rates by one entry of x, at falling steps.
 
     Attributes:
-        steps: Their steps, each half of the one before, (k,).
+        steps: Steps of the differences, each half of the one before, (k,).
         slopes: Differences of fourth order, (k, r).
-        bends: Slope on the one side less that on the other, (k, r).
-        rises: Largest change of a rate by each step, (k,), which bounds the rounding that a step adds.
+        bends: Slope on the upper side less the slope on the lower side, (k, r).
+        rises: Largest change of a rate over each step, (k,), which bounds the rounding that the step adds.
     """
 
     steps: np.ndarray
@@ -53,7 +53,7 @@ class Column:
         return cls(steps[1:], slopes, bends, np.maximum(np.abs(up - here), np.abs(down - here)).max(axis=1)[1:])
 
     def best(self, rounding: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the slopes that err least, their truncation, half the jump of the slope, and rounding, each (r,).
+        """Return the most accurate slopes, with their truncation, half the jump of the slope, and rounding, each (r,).
 
         The bend of a smooth rate is h f″ + h³ f⁗/12 + …; two extrapolations leave the jump of the slope.
 

@@ -1,12 +1,12 @@
-"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method, or period of a loop, at which it holds.
+"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest stable step of a method or period of a sampled loop.
 
-    a sampled loop:          |λ_i(Φ)| ≤ 1,   known to |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|
-    a method on δx' = J δx:  ln |R(h λ_i)| / h ≤ 2 max(0, Re λ_i(J)):  what grows in the motion may grow faster
+    a sampled loop:          |λ_i(Φ)| ≤ 1,   with an error |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|
+    a method on δx' = J δx:  ln |R(h λ_i)| / h ≤ 2 max(0, Re λ_i(J)):  a growing motion may grow faster
 
-x_i and w_i are the right and left eigenvectors, R is the stability function of a method whose Φ(h) is R(h J). Of
-others, as semi-implicit Euler, the k-th largest |λ(Φ)| is compared with the k-th largest Re λ(J). [Golub, Van Loan,
-Matrix Computations, 4th ed., 2013, 7.1 and 7.2; Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed.,
-1996, IV.2]
+x_i and w_i are the right and left eigenvectors; R is the stability function of a method with Φ(h) = R(h J). For other
+methods, for example semi-implicit Euler, the k-th largest |λ(Φ)| is compared with the k-th largest Re λ(J).
+[Golub, Van Loan, Matrix Computations, 4th ed., 2013, 7.1 and 7.2; Hairer, Wanner, Solving Ordinary Differential
+Equations II, 2nd ed., 1996, IV.2]
 """
 
 from __future__ import annotations
@@ -15,30 +15,30 @@ from collections.abc import Callable, Iterable
 from enum import StrEnum
 from math import exp, inf, log
 from sys import float_info
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.integrate.integrator import System
+from robot_dyn.integrate.integrator import Integrator, System
 
-_BAND = 1e-3  # of |λ|: no eigenvalue further from 1 is taken for one at 1, however defective it is
-_AMPLIFIES = 1e-6  # per radian of the fastest motion: an oscillation that a method amplifies by less is its error
-_ROUNDED = 1e-7  # ln |λ(Φ)|: a double eigenvalue is known to the root of rounding
-_GROWS = 2.0  # times as fast as in the motion: a method that amplifies growth by less is inaccurate, not unstable
-_LEAST, _FARTHEST = 1e-6, 1e3  # h |λ| between which limits are looked for, of the fastest and of the slowest motion
-STILL = 1e-5  # of the fastest |λ|, and per second: differences do not tell less from zero
-_SMOOTH = 0.03  # h |λ| of the fastest motion up to which Φ(h) is smooth on a scale of factors
-_SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in each radian of an oscillation
-_MOST = 500  # lengths that are tried at each part of a radian, before they grow by factors alone
-_DECAYED = 5.0  # h |Re λ| from which an oscillation is over before the next tick
-_SHARP = 3e-4  # of a limit
-LARGEST = 690.0  # ln of a growth that is told
+_BAND = 1e-3  # largest error of |λ|: an eigenvalue further from 1 is not at 1, even if it is defective
+_AMPLIFIES = 1e-6  # per radian of the fastest motion: a method that amplifies by less is inaccurate, not unstable
+_ROUNDED = 1e-7  # ln |λ(Φ)|: error of a double eigenvalue, the square root of rounding
+_GROWS = 2.0  # times the growth of the motion: a method that grows by less is inaccurate, not unstable
+_LEAST, _FARTHEST = 1e-6, 1e3  # range of h |λ| for limits: of the fastest motion, and of the slowest one
+STILL = 1e-5  # of the fastest |λ|, and per second: differences cannot distinguish a smaller |λ| from zero
+_SMOOTH = 0.03  # h |λ| of the fastest motion up to which Φ(h) is smooth in ln h
+_SCAN = (2, 8, 5)  # lengths in each factor of ten up to _SMOOTH, beyond it, and in each radian of an oscillation
+_MOST = 500  # lengths that resolve the radians of oscillations; further lengths grow by factors
+_DECAYED = 5.0  # h |Re λ| from which an oscillation has decayed before the next tick
+_SHARP = 3e-4  # relative accuracy of a limit
+LARGEST = 690.0  # ln of the largest growth that is reported
 
 
 class Stability(StrEnum):
-    """What a map is."""
+    """Stability of a map."""
 
     STABLE = "stable"
     MARGINAL = "marginal"
@@ -46,12 +46,12 @@ class Stability(StrEnum):
 
 
 class Growth(NamedTuple):
-    """How deviations grow under a map.
+    """Growth of deviations under a map.
 
     Attributes:
         factor: Spectral radius.
         least, most: Bounds of max |λ_i| − 1, from the error of each eigenvalue.
-        doubt: The error of the eigenvalue that the lower bound is of.
+        doubt: Error of the eigenvalue that determines the lower bound.
     """
 
     factor: float
@@ -61,33 +61,33 @@ class Growth(NamedTuple):
 
     @property
     def verdict(self) -> Stability:
-        """Unstable if some deviation grows for certain, stable if all decay for certain."""
+        """Unstable if a deviation certainly grows, stable if all certainly decay, else marginal."""
         if self.least > 0:
             return Stability.UNSTABLE
         return Stability.STABLE if self.most < 0 else Stability.MARGINAL
 
 
 def worst(growths: Iterable[Growth]) -> Growth:
-    """Of several maps, the bounds that hold for all."""
+    """Return the largest factor and bounds of several maps."""
     return Growth(*map(max, zip(*growths, strict=True)))
 
 
 NO_BOUND = Growth(inf, inf, inf, 0.0)
 
 
-def growth(made: Array, error: Array) -> Growth:
-    """Growth under a map whose entries are known to an error.
+def growth(matrix: Array, error: Array) -> Growth:
+    """Return the growth under a map whose entries have errors; NO_BOUND if an entry is not finite.
 
     Args:
-        made: The map, (m, m).
-        error: Of its entries, (m, m), not negative.
+        matrix: The map, (m, m).
+        error: Largest error of each entry, (m, m), not negative.
     """
     from scipy.linalg import eig
 
-    if not np.isfinite(made).all():
+    if not np.isfinite(matrix).all():
         return NO_BOUND
-    with np.errstate(all="ignore"):  # a defective eigenvalue has left and right vectors at right angles
-        values, left, right = cast(tuple[Array, Array, Array], eig(made, left=True, right=True))
+    with np.errstate(all="ignore"):  # the left and right eigenvectors of a defective eigenvalue are orthogonal
+        values, left, right = cast(tuple[Array, Array, Array], eig(matrix, left=True, right=True))
         doubt = np.einsum("ik,ij,jk->k", np.abs(left), error, np.abs(right)) / np.abs((left.conj() * right).sum(axis=0))
     size, doubt = np.abs(values), np.minimum(np.nan_to_num(doubt, nan=_BAND), _BAND)
     k = int((size - doubt).argmax())
@@ -95,39 +95,42 @@ def growth(made: Array, error: Array) -> Growth:
     return Growth(float(size.max()), least, most, float(doubt[k]))
 
 
-def longest_step(method: Any, J: Array, n: int) -> float:
-    """The longest step of a method that is stable on δx' = J δx, in [s]; inf if every step is.
+def longest_step(method: Integrator, J: Array, n: int) -> float:
+    """Return the longest step of a method that is stable on δx' = J δx, in [s]; inf if every step is.
 
-    Steps whose stages are not found, as long ones of Gauss methods by fixed-point iteration, count as unstable.
+    A step is unstable if its stages do not converge, such as a long step of a Gauss method by fixed-point iteration.
 
     Args:
         method: A method of fixed step.
-        J: (m, m).
+        J: Jacobian, (m, m), in [1/s].
         n: Number of positions, the first entries of x.
     """
     excess = excess_rate(method, J, n)
     return first_unstable(lambda h: excess(h) > 0, lengths(np.linalg.eigvals(J), np.zeros(0)))
 
 
-def excess_rate(method: Any, J: Array, n: int) -> Callable[[float], float]:
-    """The rate, in [1/s], by which steps h let deviations grow faster than is allowed; a function of h.
+def excess_rate(method: Integrator, J: Array, n: int) -> Callable[[float], float]:
+    """Return a function of the step h: the rate, in [1/s], by which the growth of deviations exceeds the allowed one.
 
-    Args: As of `longest_step`.
+    Args:
+        method: A method of fixed step.
+        J: Jacobian, (m, m), in [1/s].
+        n: Number of positions, the first entries of x.
     """
     from scipy.linalg import schur
 
     T, Z = cast(tuple[Array, Array], schur(J, "complex"))
-    rates, made = T.diagonal(), step_map(method, J, n)
+    rates, phi = T.diagonal(), step_map(method, J, n)
     allowed = _GROWS * np.maximum(0.0, np.real(rates)) + _AMPLIFIES * np.abs(rates).max()
-    of_each = _acts_on_each(method, J, n)
+    is_function = _is_function_of_hJ(method, J, n)
 
     def excess(h: float) -> float:
         try:
             with np.errstate(all="ignore"):
-                if of_each:  # Φ(h) = R(h J) is triangular in the basis in which J is
-                    grown = np.log(np.abs(np.einsum("ji,jk,ki->i", Z.conj(), made(h), Z)))
+                if is_function:  # then Φ(h) = R(h J) is triangular in the Schur basis of J
+                    grown = np.log(np.abs(np.einsum("ji,jk,ki->i", Z.conj(), phi(h), Z)))
                     return _largest(grown / h - allowed)
-                grown = np.log(np.sort(np.abs(np.linalg.eigvals(made(h)))))
+                grown = np.log(np.sort(np.abs(np.linalg.eigvals(phi(h)))))
                 return _largest(np.where(grown < _ROUNDED, 0.0, grown / h) - np.sort(allowed))
         except (RobotDynError, np.linalg.LinAlgError):
             return inf
@@ -136,12 +139,12 @@ def excess_rate(method: Any, J: Array, n: int) -> Callable[[float], float]:
 
 
 def _largest(rates: Array) -> float:
-    """The largest of some rates, inf where one is none."""
+    """Return the largest rate; inf if one is not a number."""
     return inf if np.isnan(rates).any() else float(rates.max())
 
 
-def _acts_on_each(method: Any, J: Array, n: int) -> bool:
-    """Whether Φ(h) is a function of h J: a method that treats positions and velocities alike does not read n."""
+def _is_function_of_hJ(method: Integrator, J: Array, n: int) -> bool:
+    """Return True if Φ(h) is a function of h J: the method treats positions and velocities alike and ignores n."""
     h = _SMOOTH / max(STILL, float(np.abs(np.linalg.eigvals(J)).max()))
     try:
         return np.array_equal(step_map(method, J, n)(h), step_map(method, J, 0)(h))
@@ -149,11 +152,11 @@ def _acts_on_each(method: Any, J: Array, n: int) -> bool:
         return False
 
 
-def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
-    """Φ(h) of a method of fixed step on δx' = J δx, as of `longest_step`."""
+def step_map(method: Integrator, J: Array, n: int) -> Callable[[float], Array]:
+    """Return Φ(h) of a method of fixed step on δx' = J δx; see `longest_step` for the arguments."""
     by_entry = np.concatenate([J.T, np.zeros((1, len(J)))])
 
-    def exact(t: Any, y: Array) -> Array:
+    def exact(t: object, y: Array) -> Array:
         return np.broadcast_to(by_entry.reshape(-1, *(1,) * (y.ndim - 1), len(J)), (len(J) + 1, *y.shape)).copy()
 
     system = System(lambda t, y: y @ J.T, n, exact=exact)
@@ -161,64 +164,65 @@ def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
 
 
 def after(factor: float, times: float) -> float:
-    """factor^times, at most e^690 = 4.6e299."""
+    """Return factor^times, limited to e^690 = 4.6e299."""
     return exp(min(times * log(factor), LARGEST)) if factor > 0 and times else float(not times)
 
 
 def periods(duration_s: float, period_s: float) -> int:
-    """Number of whole periods in a duration, each of which may be rounded."""
+    """Return the number of whole periods in a duration; both may be rounded."""
     return int(duration_s / period_s * (1 + 4 * float_info.epsilon))
 
 
 def shown(factor: float) -> str:
-    """A factor in four digits, or as 1 and two digits; as a bound if it is the largest that is told."""
+    """Return the text of a factor: four digits, 1 + two digits close to 1, or a bound if it is the largest reported."""
     if factor >= exp(LARGEST):
         return "more than 1e+299"
     return f"1 + {factor - 1:.2g}" if 0 < factor - 1 < _BAND else f"{factor:.4g}"
 
 
 def below(limit: float) -> str:
-    """A length safely below a limit, in one digit."""
+    """Return the text of half a limit, in one digit."""
     return f"{float(f'{limit / 2:.0e}'):g}"
 
 
-def lengths(rates: Array, rings: Array, least: float = _LEAST) -> list[float]:
-    """Lengths h to try, the shortest first, for motions of these rates λ; none if nothing moves.
+def lengths(rates: Array, oscillations: Array, least: float = _LEAST) -> list[float]:
+    """Return the lengths h to try in ascending order, for motions with eigenvalues λ; none if all λ are 0.
 
     Args:
-        rates: Eigenvalues, in [1/s].
-        rings: Those of oscillations by which stability may come and go as h grows.
-        least: The first h |λ|, of the fastest motion.
+        rates: Eigenvalues λ, in [1/s].
+        oscillations: Eigenvalues of oscillations, which may make the loop unstable and stable again as h grows.
+        least: First h |λ| of the fastest motion.
     """
     sizes = np.abs(rates)
     fastest = float(sizes.max(initial=0.0))
-    told = sizes[sizes > STILL * max(1.0, fastest)]
-    if not len(told):
+    moving = sizes[sizes > STILL * max(1.0, fastest)]
+    if not len(moving):
         return []
-    h, last, made = least / fastest, _FARTHEST / float(told.min()), []
+    h, last, result = least / fastest, _FARTHEST / float(moving.min()), []
     while h < last:
-        made.append(h)
-        goes_on = np.abs(np.imag(rings))[-np.real(rings) * h < _DECAYED] if len(made) < _MOST else np.zeros(0)
-        step = 1 / (_SCAN[2] * goes_on.max()) if goes_on.any() else inf
+        result.append(h)
+        lasting = -np.real(oscillations) * h < _DECAYED
+        frequencies = np.abs(np.imag(oscillations))[lasting] if len(result) < _MOST else np.zeros(0)
+        step = 1 / (_SCAN[2] * frequencies.max()) if frequencies.any() else inf
         h = min(h * 10 ** (1 / _SCAN[int(h * fastest > _SMOOTH)]), h + step)
-    return made
+    return result
 
 
-def first_unstable(unstable: Callable[[float], bool], tried: list[float]) -> float:
-    """The length up to which nothing is unstable; inf if nothing tried is, 0 if the shortest is.
+def first_unstable(is_unstable: Callable[[float], bool], candidates: list[float]) -> float:
+    """Return the length below the first unstable one; inf if none is unstable, 0 if the shortest is.
 
     Args:
-        unstable: Whether Φ(h) is.
-        tried: Lengths, the shortest first.
+        is_unstable: Function of h that is True if Φ(h) is unstable.
+        candidates: Lengths in ascending order.
     """
     before = 0.0
-    for beyond in tried:
-        if unstable(beyond):
+    for beyond in candidates:
+        if is_unstable(beyond):
             break
         before = beyond
     else:
         return inf
     while before and beyond - before > _SHARP * beyond:
         middle = (before + beyond) / 2
-        before, beyond = (before, middle) if unstable(middle) else (middle, beyond)
+        before, beyond = (before, middle) if is_unstable(middle) else (middle, beyond)
     return before

@@ -1,7 +1,7 @@
 """The state equation: the motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
 
     q' = v,   v' = M⁻¹ (τ − C v − N)   or   p' = τ + Cᵀ v − N with p = M v,
-    z' = rate of the states of the controller, then of the effects; then J' = λ, the reactions of what holds joints,
+    z' = rates of the states of the controller, then of the effects; then J' = λ, the reactions of stops and friction,
     W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
 
 [Murray, Li, Sastry 1994, ch. 4; Hairer, Lubich, Wanner 2006, §VI.1 for canonical coordinates]
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.dynamics.event import Event
 
 CONTROL = "control"
-PICK_UP = "pick_up"  # the work of impacts where payloads at rest are picked up
-CONTROLLER = -1  # among the parts that switch, beside the numbers of the effects
+PICK_UP = "pick_up"  # the work of impacts at which payloads at rest are picked up
+CONTROLLER = -1  # number of the controller among the parts that switch; effects have their index
 
 
 @final
@@ -39,10 +39,10 @@ class StateEquation(Caching):
     """The state equation of a plant under a controller.
 
     Attributes:
-        plant: What moves.
-        controller: What drives it, or None.
-        canonical: Whether the second part of y is the momentum p instead of v.
-        events: Functions of the state that a run looks out for.
+        plant: The arm with the effects that act on it.
+        controller: The controller, or None.
+        canonical: True if the second part of y is the momentum p instead of v.
+        events: User-defined events that a run detects.
     """
 
     plant: Plant
@@ -57,22 +57,22 @@ class StateEquation(Caching):
 
     @cached_property
     def sources(self) -> tuple[str, ...]:
-        """Names of the works in y: control, then effects, of a second effect of a name with a number.
+        """Names of the works in y: control, then effects; the second effect of a name has a number.
 
-        Payloads that come and go, and the impacts of their picking up, work at once, not by a power: they come last.
+        Payloads that are picked up or dropped, and the impacts at that, come last: their work jumps and has no power.
         """
         payloads = self.equation_of_motion.payloads
-        impacts = [PICK_UP] * any(each.at_rest and each.start_s > 0 for each in payloads)
+        impacts = [PICK_UP] * any(payload.at_rest and payload.start_s > 0 for payload in payloads)
         return numbered(CONTROL, *self._working, *(x.name for x in payloads), *impacts)
 
     @cached_property
     def _working(self) -> list[str]:
-        """Names of the forces that work by a power."""
+        """Names of the forces that have a power."""
         return [x.name for x in self.plant.forces if not isinstance(x, Conservative)]
 
     @cached_property
     def of_payloads(self) -> range:
-        """Numbers of the works of payloads that come and go."""
+        """Indices, in `sources`, of the works of payloads that are picked up or dropped."""
         first = 1 + len(self._working)
         return range(first, first + len(self.equation_of_motion.payloads))
 
@@ -88,13 +88,13 @@ class StateEquation(Caching):
 
     @cached_property
     def impulses(self) -> int:
-        """Number of the impulses of reactions, the last of the states: n where joints may be held, or 0."""
+        """Number of the impulses of reactions, the last of the states: n if an effect may hold joints, else 0."""
         return self.plant.dynamics.n if self.equation_of_motion.set_valued else 0
 
     @cached_property
     def in_a_mode(self) -> StateEquation:
-        """The equation in a mode, one in which nothing is held and all payloads are carried; or itself."""
-        if payloads := [each for each in self.equation_of_motion.payloads if each.carried is None]:
+        """The equation in the mode in which no joint is held and all payloads are carried; itself without modes."""
+        if payloads := [payload for payload in self.equation_of_motion.payloads if payload.carried is None]:
             return replace(self, plant=carrying(self.plant, [True] * len(payloads))).in_a_mode
         if not self.impulses:
             return self
@@ -107,7 +107,7 @@ class StateEquation(Caching):
 
     @cached_property
     def widths(self) -> np.ndarray:
-        """Change of each entry of y over which the rate bends, (m,): the least of the effects, inf where none says."""
+        """Change of each entry of y over which the rate bends, (m,): the smallest that an effect declares, else inf."""
         n = self.plant.dynamics.n
         widths = np.full(self.size, np.inf)
         for effect in self.plant.effects:
@@ -116,7 +116,7 @@ class StateEquation(Caching):
         return widths
 
     def start(self, q: Array, v: Array) -> Array:
-        """Y at the start: states of the controller, and works, are zero."""
+        """Return y at the start, (m,), with the states of the effects; those of the controller and the works are 0."""
         second = self.plant.dynamics.momentum(q, v) if self.canonical else v
         y = np.concatenate([q, second, np.zeros(self.states + len(self.sources))])
         first = 2 * len(q) + self.state_size
@@ -124,27 +124,26 @@ class StateEquation(Caching):
         return y
 
     def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
-        """q, v, z, W of y, with z the states of the controller, then of the effects."""
+        """Return q, v, z, W of y, with z the states of the controller, then of the effects, then the impulses."""
         n, m = self.plant.dynamics.n, self.states
         q, second = y[:n], y[n : 2 * n]
         v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
         return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
 
     def controller_states(self, y: Array) -> Array | None:
-        """Controller states in states y (k, m), (k, state_size); None without any."""
+        """Return the states of the controller in states y (k, m), (k, state_size); None if it has none."""
         n, m = self.plant.dynamics.n, self.state_size
         return y[:, 2 * n : 2 * n + m].copy() if m else None
 
     def effect_states(self, y: Array) -> dict[str, Array]:
-        """States of each effect that has some in states y (k, m), (k, size) by name."""
+        """Return the states of each effect with states in states y (k, m), (k, size), by name."""
         first, equation = 2 * self.plant.dynamics.n + self.state_size, self.equation_of_motion
         names = numbered(*(self.plant.effects[k].name for k in equation.states))
         places = zip(names, equation.states.values(), strict=True)
         return {name: y[:, first + place.start : first + place.stop].copy() for name, place in places}
 
     def stored(self, t: Array, y: Array) -> dict[str, Array]:
-        """Energy that the states of effects hold at times t (k,) and states y (k, m), (k,) by name."""
-        held = self.effect_states(y)
+        """Return the energy stored by each effect with states, at times t (k,) and states y (k, m), (k,), by name."""
         effects = [x for x in self.plant.effects if isinstance(x, Stateful)]
         return {
             name: np.array(
@@ -153,16 +152,16 @@ class StateEquation(Caching):
                     for state in zip(t, y[:, : self.plant.dynamics.n], z, strict=True)
                 ]
             ).reshape(len(t))
-            for effect, (name, z) in zip(effects, held.items(), strict=True)
+            for effect, (name, z) in zip(effects, self.effect_states(y).items(), strict=True)
         }
 
     def velocities(self, y: Array) -> Array:
-        """V of states y (k, m), (k, n)."""
+        """Return the velocities v in states y (k, m), (k, n)."""
         n = self.plant.dynamics.n
         return np.array([self.state(row)[1] for row in y]).reshape(-1, n) if self.canonical else y[:, n : 2 * n]
 
     def fastest_joint(self, y: Array) -> str:
-        """Name of the joint that moves fastest at a state, which may be far out; by momentum where M is singular."""
+        """Return the name of the joint with the largest |v|, or |p| if M cannot be inverted, at a state y (m,)."""
         n = self.plant.dynamics.n
         with np.errstate(all="ignore"):
             try:
@@ -172,29 +171,29 @@ class StateEquation(Caching):
         return self.plant.dynamics.joint_names[int(np.argmax(np.abs(v)))]
 
     def command(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """The actuation that the controller asks for, within the bounds of the plant before one with states."""
+        """Return the torque of the controller within the bounds that precede effects with states, (n,)."""
         if self.controller is None:
             return np.zeros_like(v)
         return self.equation_of_motion.commanded(call(self.controller.torque, t, q, v, z[: self.state_size]))
 
     def actuation(self, t: float, q: Array, v: Array, z: Array, held: Array | None) -> Array:
-        """The actuation within all bounds of the plant; of `held` in zero-order hold, if it is not None."""
+        """Return the actuation within all bounds of the plant; that of `held`, in zero-order hold, if not None."""
         u = self.command(t, q, v, z) if held is None else held
         return self.equation_of_motion.applied(u, z[self.state_size :])[0]
 
     def acceleration(self, t: float, q: Array, v: Array, z: Array, u: Array) -> Array:
-        """The acceleration under the actuation u within all bounds."""
+        """Return the acceleration under an actuation u that is within all bounds, (n,)."""
         equation = self.equation_of_motion
         torques = equation.torques(t, q, v, z=z[self.state_size :])
         return equation.acceleration(q, v, sum(torques, start=equation.on_joints(u)))
 
     @property
     def sampled(self) -> bool:
-        """Whether the controller acts at ticks, with a zero-order hold between them."""
+        """True if the controller acts at ticks, with a zero-order hold between them."""
         return self.controller is not None and self.controller.period_s > 0
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
-        """A tick of a sampled controller: y with the next controller states, and u; y and None for any other."""
+        """Return y with the next states of a sampled controller, and u; y and None for any other controller."""
         if self.controller is None or not self.sampled:
             return y, None
         q, v, z, _ = self.state(y)
@@ -205,18 +204,18 @@ class StateEquation(Caching):
         return y, held
 
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
-        """f(t, y), and the actuation u; in floats or, for the compiled engine, in symbols.
+        """Return f(t, y), (m,), and the actuation u; in floats or, for the compiled engine, in symbols.
 
         Args:
-            t: In [s].
-            y: One state.
+            t: Time, in [s].
+            y: State, (m,).
             held: The actuation in zero-order hold of a sampled controller; None if it acts continuously.
         """
         equation, controller, n = self.equation_of_motion, self.controller, self.plant.dynamics.n
         q, v, z, _ = self.state(y)
-        of_controller, of_effects = z[: self.state_size], z[self.state_size :]
-        u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, of_effects)
-        torques = equation.torques(t, q, v, z=of_effects)
+        z_controller, z_effects = z[: self.state_size], z[self.state_size :]
+        u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, z_effects)
+        torques = equation.torques(t, q, v, z=z_effects)
         total = sum(torques, start=equation.on_joints(u))
         result = np.empty_like(y)
         result[:n] = v
@@ -226,23 +225,23 @@ class StateEquation(Caching):
         else:
             second = equation.momentum_rate if self.canonical else equation.acceleration
             result[n : 2 * n] = second(q, v, total)
-        remembers = held is None and controller is not None and self.state_size > 0
-        result[2 * n : end] = call(controller.state_rate, t, q, v, of_controller) if remembers and controller else 0.0
+        has_rate = held is None and controller is not None and self.state_size > 0
+        result[2 * n : end] = call(controller.state_rate, t, q, v, z_controller) if has_rate and controller else 0.0
         rates = result[end : end + equation.state_size]
         a = result[n : 2 * n]
-        for place, rate in equation.state_rates(t, q, v, u, reached, of_effects, a):
+        for place, rate in equation.state_rates(t, q, v, u, reached, z_effects, a):
             rates[place] = rate
-        result[W:] = self._powers(v, u, torques, of_effects, a)
+        result[W:] = self._powers(v, u, torques, z_effects, a)
         return result, u
 
     def _powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Scalar]:
-        """Of each source; those that work at once have none."""
+        """Return the power of each source; 0 for those whose work jumps."""
         powers = self.equation_of_motion.powers(v, u, torques, z, a)
         return powers + [0.0] * (len(self.sources) - len(powers))
 
     @cached_property
     def limited(self) -> tuple[int, ...]:
-        """Parts with thresholds of an actuation that changes between ticks: CONTROLLER, and numbers of effects."""
+        """Parts with thresholds of an actuation that changes between ticks: CONTROLLER, and indices of effects."""
         if self.controller is None:
             return ()
         effects, n = self.plant.effects, self.plant.dynamics.n
@@ -251,58 +250,61 @@ class StateEquation(Caching):
         declared = {k: effects[k].thresholds(n) for k in bounds}
         if not self.sampled:
             declared = {CONTROLLER: self.controller.thresholds()} | declared
-        return tuple(k for k, of in declared.items() if any(each.of_actuation for each in of))
+        return tuple(k for k, thresholds in declared.items() if any(x.of_actuation for x in thresholds))
 
     @property
     def switches(self) -> bool:
-        """Whether a part switches at a threshold, or there are events."""
-        parts = self.plant.effects, self.plant.dynamics.n
-        declared = [each for effect in parts[0] for each in effect.thresholds(parts[1])]
+        """True if a part switches at a threshold, or there are user-defined events."""
+        effects, n = self.plant.effects, self.plant.dynamics.n
+        declared = [threshold for effect in effects for threshold in effect.thresholds(n)]
         if self.controller is not None and not self.sampled:
             declared += self.controller.thresholds()
-        return bool(self.events or self.limited or self.impulses or any(not each.of_actuation for each in declared))
+        return bool(
+            self.events or self.limited or self.impulses or any(not threshold.of_actuation for threshold in declared)
+        )
 
-    def demands(self, t: float, q: Array, v: Array, z: Array, held: Array | None, of: tuple[int, ...]) -> list[Array]:
-        """What reaches those parts, (n,) each, which thresholds of the actuation are levels of: as of `limited`."""
-        if not of or self.controller is None:
+    def demands(
+        self, t: float, q: Array, v: Array, z: Array, held: Array | None, parts: tuple[int, ...]
+    ) -> list[Array]:
+        """Return the torque that reaches each of these parts, (n,), which its thresholds limit; see `limited`."""
+        if not parts or self.controller is None:
             return []
         state, equation = (t, q, v, z[: self.state_size]), self.equation_of_motion
         whole = range(len(equation.effects))
         u, bounds = (call(self.controller.torque, *state), whole) if held is None else (held, None)
         reached = equation.applied(u, z[self.state_size :], bounds)[1]
-        return [call(self.controller.demand, *state) if k == CONTROLLER else reached[k] for k in of]
+        return [call(self.controller.demand, *state) if k == CONTROLLER else reached[k] for k in parts]
 
-    def switching(self, t: float, q: Array, v: Array) -> list[Any]:
-        """The values of the events, in floats or symbols."""
-        return [call(each.function, t, q, v) for each in self.events]
+    def switching(self, t: float, q: Array, v: Array) -> list[Scalar]:
+        """Return the values of the user-defined events, in floats or symbols."""
+        return [call(event.function, t, q, v) for event in self.events]
 
     def bodies(self, t: float, y: Array, held: Array | None) -> Array:
-        """Return what the convex problems of events take, by rows, (n² + n + motors,): M, load and u_m.
+        """Return the data of the convex problems at events: M by rows, load and u_m, (n² + n + motors,).
 
             load = τ + Σ τ_effect − C v − ∂V/∂q,   u_m = u − b θ̇ of each motor in a rigid backlash
 
-        It is evaluated in a mode in which no motor rests, in floats or symbols; arguments as of `rate`.
+        The mode is one in which no motor rests; the numbers are floats or symbols. See `rate` for the arguments.
         """
         motion, n, (q, v, z, _) = self.equation_of_motion, self.plant.dynamics.n, self.state(y)
-        u, of_effects = self.actuation(t, q, v, z, held), z[self.state_size :]
-        torques = motion.torques(t, q, v, z=of_effects)
+        u, z_effects = self.actuation(t, q, v, z, held), z[self.state_size :]
+        torques = motion.torques(t, q, v, z=z_effects)
         load = sum(torques, start=motion.on_joints(u)) - self.plant.dynamics.inverse_dynamics(q, v, 0 * v)
         coupled: dict[int, Any] = {k: drive for k, drive in motion.drives.items() if drive.coupled}
-        motors = [u[list(x.driven(n))] - x.drag(n, of_effects[motion.states[k]]) for k, x in coupled.items()]
+        motors = [u[list(x.driven(n))] - x.drag(n, z_effects[motion.states[k]]) for k, x in coupled.items()]
         return np.concatenate([self.plant.M(q).ravel(), load, *motors])
 
     def event_values(self, t: float, y: Array, held: Array | None) -> Array:
-        """Return what reaches each limited part, (n,) each, and the values of the events, (G,), in a state (m,)."""
+        """Return the torques that reach the limited parts, (n,) each, then the values of events, (G,), at y (m,)."""
         q, v, z, _ = self.state(y)
         demands = self.demands(t, q, v, z, held, self.limited)
         return np.array([*np.ravel(demands), *self.switching(t, q, v)], dtype=float)
 
     def energies(self, t: Scalar, q: Array, v: Array) -> tuple[Array, Array]:
-        """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
+        """Return K, and V of gravity and of all conservative effects, in [J], of samples q, v (k, n), (k,)."""
         return self.equation_of_motion.energies(t, q, v)
 
     def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[Scalar]:
-        """Power of the control and of the effects that work, in the order of `sources`."""
-        equation = self.equation_of_motion
-        own = z[self.state_size :]
-        return self._powers(v, u, equation.torques(t, q, v, z=own), own, 0 * v)
+        """Return the power of each source, in [W], in the order of `sources`; 0 for those whose work jumps."""
+        z_effects = z[self.state_size :]
+        return self._powers(v, u, self.equation_of_motion.torques(t, q, v, z=z_effects), z_effects, 0 * v)

@@ -1,7 +1,7 @@
 """The choice of the engine of a run; the interpreted one is built in, any other is a plug-in.
 
-ENGINES names the function of each plug-in as an entry point does, "module:function". It is called as (setup, seen) and
-is imported on use, so that a run knows the protocol `Engine` and no machine code.
+ENGINES has the function of each plug-in as "module:function". It is called as (setup, seen) and imported on first use,
+so that a run depends on the protocol `Engine` and not on machine code.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ def choose(setup: Setup, seen: float = 0) -> Engine:
     """Return the engine that runs a setup.
 
     Args:
-        setup: What to run.
-        seen: A lower bound of its evaluations, without its companions.
+        setup: The setup to run.
+        seen: Lower bound of the number of evaluations, without companion runs.
 
     Raises:
-        TraceError: If engine is "compiled" and a part cannot be; names it.
+        TraceError: If engine is "compiled" and a part cannot be compiled; names the part.
         MachineError: If the machine code does not agree with the interpreted engine.
     """
     if setup.engine == "interpreted":
         return interpreted_engine(setup)
-    if setup.engine == "auto" and (parts := setup.undeclared):  # they may do what a trace would lose
+    if setup.engine == "auto" and (parts := setup.undeclared):  # a trace might miss changes in them
         return interpreted_engine(setup, " ".join((named(parts[0][0]), parts[0][1])))
     return resolve_name(ENGINES["compiled"])(setup, seen)

@@ -20,16 +20,16 @@ T = TypeVar("T")
 
 
 class Watched(Protocol):
-    """What an interpreted function reports errors to; see `run.watch.Watch`."""
+    """The monitor of a run, which turns errors of interpreted functions into its outcome; see `run.watch.Watch`."""
 
     setup: Setup
 
     def tick(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-        """Run one controller tick."""
+        """Return y with the next states of the controller, and the torque to hold; see `StateEquation.tick`."""
         ...
 
-    def answer(self, t: float, y: np.ndarray, ask: Callable[[], T]) -> T:
-        """Return the result of `ask`; raise the error that ends the run if the equations cannot be evaluated."""
+    def answer(self, t: float, y: np.ndarray, compute: Callable[[], T]) -> T:
+        """Return the result of `compute`; raise the error that ends the run if the equations cannot be evaluated."""
         ...
 
 
@@ -37,10 +37,10 @@ class Evaluated(NamedTuple):
     """A state equation as functions, see `Engine`.
 
     Attributes:
-        functions: As the time loop calls them; addresses if it is machine code.
-        in_python: The same functions as Python calls them.
-        numbers: Their parameters, (P,), which follow the actuation in zero-order hold in `run_parameters`.
-        by_numbers: True if other coefficients, such as those of a mode, change the numbers alone.
+        functions: Functions for the time loop; addresses if the loop is machine code.
+        in_python: The same functions as Python functions.
+        numbers: Parameters of the functions, (P,); they follow the actuation in zero-order hold in `run_parameters`.
+        by_numbers: True if other coefficients, such as those of a mode, change only the numbers.
     """
 
     functions: Functions
@@ -50,11 +50,10 @@ class Evaluated(NamedTuple):
 
 
 class Engine(Protocol):
-    """What evaluates the state equation y' = f(t, y) of a run, in [rad], [m], [s], [kg], and takes its steps.
+    """An engine evaluates the state equation y' = f(t, y) of a run, in [rad], [m], [s], [kg], and takes its steps.
 
-    Each of its functions is called as (t, y, p, run_parameters, out) and writes into `out`: y is (m, 1), p are the
-    numbers of a segment of the run, and run_parameters (O, 1) the torques in zero-order hold, then the parameters.
-    With n joints:
+    Its functions are called as (t, y, p, run_parameters, out) and write into `out`. y is (m, 1); p are the numbers of
+    a segment of the run; run_parameters (O, 1) are the torques in zero-order hold, then the parameters. With n joints:
 
         rate       y' and the actuation u                                     (m + n, 1)
         jacobian   ∂f/∂y_j for each j, then ∂f/∂t                             (m + 1, m, 1)
@@ -62,13 +61,13 @@ class Engine(Protocol):
         sample     y', u, K and V                                             (m + n + 2, 1)
         tick       u in zero-order hold, then the states of the controller    (n + z, 1)
         bodies     M by rows, loads, loads of motors; see `StateEquation.bodies`            (n² + n + motors, 1)
-        events     what reaches limited parts, then user-defined events       (F, 1)
-        step       a step in which velocities may jump; see `RightSide`, also for `behind`
+        events     torques at limited parts, then user-defined events         (F, 1)
+        step       a step in which velocities may jump; see `RightSide`, also for `after_step`
 
     Attributes:
-        exact_right_angles: True if right angles of the robot's file are written out in full.
-        doubtful: Σ |y| beyond which a step of fixed length is repeated by the interpreted equation.
-        most_threads: Threads that may run it side by side.
+        exact_right_angles: True if right angles of the robot's file are used to all digits of float64.
+        doubtful: Σ |y| beyond which the interpreted equation repeats a step of fixed length.
+        most_threads: Number of threads that may use it at the same time.
     """
 
     exact_right_angles: ClassVar[bool]
@@ -87,20 +86,20 @@ class Engine(Protocol):
 
     @property
     def most_steps(self) -> float:
-        """Steps after which the loop returns: 1 to report progress at each of them."""
+        """Number of steps after which the loop returns; 1 to return, and report progress, at each step."""
         ...
 
     @property
     def most_evaluations(self) -> float:
-        """Evaluations after which another engine is to be chosen."""
+        """Number of evaluations after which the engine is chosen again."""
         ...
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
-        """Return the functions of an equation that differs from its own in coefficients or payloads.
+        """Return the functions of an equation that differs from that of the engine in coefficients or payloads.
 
         Args:
             equation: The state equation.
-            watch: What interpreted functions report errors to.
+            watch: Monitor of the run, for interpreted functions.
         """
         ...
 
@@ -113,5 +112,5 @@ class Engine(Protocol):
         ...
 
     def compiling_s(self) -> float:
-        """Return the time that this thread has spent on loading and compiling loops until now, in [s]."""
+        """Return the time that this thread has spent on loading and compiling loops so far, in [s]."""
         ...

@@ -16,7 +16,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.dynamics.loop_state import Functions
-from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
+from robot_dyn.simulation.dynamics.moreau_jean import after_step, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Evaluated, Watched
 from robot_dyn.simulation.events.contact_mode import Places
@@ -26,7 +26,7 @@ from robot_dyn.simulation.setup.setup import Setup
 @final
 @dataclass(frozen=True)
 class Interpreted:
-    """The engine that evaluates a state equation in Python; attributes as in `Engine`."""
+    """The engine that evaluates a state equation in Python; see `Engine` for the attributes."""
 
     equation: StateEquation
     label: str = "interpreted"
@@ -45,7 +45,7 @@ class Interpreted:
         return Evaluated(functions, functions, numbers, False)
 
     def places(self) -> Places:
-        """Return the places of the mode: the run parameters are the mode and nothing else."""
+        """Return the places of the mode; apart from the zero-order hold, the run parameters are the mode."""
         n = self.equation.plant.dynamics.n
         first = n * self.equation.sampled
         return Places(*(np.array([first + k * n], np.int64) for k in range(3)))  # held, direction and contact
@@ -58,29 +58,29 @@ class Interpreted:
         return 0.0
 
 
-def interpreted_engine(setup: Setup, why: str = "", most: float = inf) -> Interpreted:
+def interpreted_engine(setup: Setup, reason: str = "", most: float = inf) -> Interpreted:
     """Return the engine that runs a setup in Python.
 
     Args:
-        setup: What to run.
-        why: The reason for this engine, in its label.
-        most: Evaluations after which another engine is to be chosen.
+        setup: The setup to run.
+        reason: Reason for this engine, for its label.
+        most: Number of evaluations after which the engine is chosen again.
     """
-    reasons = [why] * bool(why) + ["Jacobian by differences"] * setup.method.needs_jacobian
+    reasons = [reason] * bool(reason) + ["Jacobian by differences"] * setup.method.needs_jacobian
     label = f"interpreted ({'; '.join(reasons)})" if reasons else "interpreted"
     return Interpreted(setup.equation, label, most)
 
 
 def interpreted(equation: StateEquation, watch: Watched) -> Functions:
-    """The functions of a state equation, in Python.
+    """Return the functions of a state equation as Python functions.
 
-    `rate` and `jacobian` raise what the equation raises, `tick` and `energy` the DivergedError of the watch; `sample`
-    gives nan.
+    If the equation cannot be evaluated, `rate` and `jacobian` raise its error, `tick` and `energy` raise the
+    DivergedError of the watch, and `sample` writes nan.
     """
     n, m = equation.plant.dynamics.n, equation.size
 
     def at(t: float, y: Array, p: Array, run_parameters: Array) -> tuple[float, Array, Array | None]:
-        """Time within the segment, state, and torques in zero-order hold."""
+        """Return the time within the segment, the state, and the torques in zero-order hold."""
         return min(max(t, p[0]), p[1]), _state(y), run_parameters[:n, 0].copy() if equation.sampled else None
 
     def rate(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
@@ -103,37 +103,37 @@ def interpreted(equation: StateEquation, watch: Watched) -> Functions:
         out[:, :, 0] = system(functions, equation, p, run_parameters, exact=False).derivatives(t, y[:, 0], end)
 
     def step(t: float, x: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        made = stepped(equation, *at(t, x, p, run_parameters))
-        out[: len(made), 0] = made
+        result = stepped(equation, *at(t, x, p, run_parameters))
+        out[: len(result), 0] = result
 
-    def of_behind(t: float, x: Array, p: Array, found: Array, out: Array) -> None:
-        out[:, 0] = behind(equation, x[:, 0], found[:, 0])
+    def after(t: float, x: Array, p: Array, solved: Array, out: Array) -> None:
+        out[:, 0] = after_step(equation, x[:, 0], solved[:, 0])
 
-    def of_bodies(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+    def bodies(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         out[:, 0] = equation.bodies(*at(t, y, p, run_parameters))
 
     def events(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         out[:, 0] = equation.event_values(*at(t, y, p, run_parameters))
 
-    functions = Functions(rate, tick, energy, sampled, jacobian, events, step, of_behind, bodies=of_bodies)
+    functions = Functions(rate, tick, energy, sampled, jacobian, events, step, after, bodies=bodies)
     return functions
 
 
 def in_modes(equation: StateEquation, watch: Watched) -> Functions:
-    """The same in the mode that the last 3n run parameters are: held, direction and contact."""
-    known: dict[bytes, Functions] = {}
+    """Return the functions of a state equation in the mode of the last 3 n run parameters: held, direction, contact."""
+    cache: dict[bytes, Functions] = {}
 
-    def of(run_parameters: Array) -> Functions:
+    def in_mode_of(run_parameters: Array) -> Functions:
         numbers = run_parameters[len(run_parameters) - 3 * equation.plant.dynamics.n :, 0]
         key = numbers.tobytes()
-        if key not in known:
+        if key not in cache:
             mode = Mode(*numbers.copy().reshape(3, -1))
-            known[key] = interpreted(replace(equation, plant=in_mode(equation.plant, mode)), watch)
-        return known[key]
+            cache[key] = interpreted(replace(equation, plant=in_mode(equation.plant, mode)), watch)
+        return cache[key]
 
     def forwarded(name: str) -> Callable[..., None]:
         def function(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-            getattr(of(run_parameters), name)(t, y, p, run_parameters, out)
+            getattr(in_mode_of(run_parameters), name)(t, y, p, run_parameters, out)
 
         return function
 
@@ -142,7 +142,7 @@ def in_modes(equation: StateEquation, watch: Watched) -> Functions:
 
 
 def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out: Array) -> None:
-    """What a sample holds: y', u, K and V, (m + n + 2,); nan for what has no value just before a run diverges."""
+    """Write the numbers of a sample, y', u, K, V, into `out` (m + n + 2,); nan for those that cannot be evaluated."""
     n, m = equation.plant.dynamics.n, equation.size
     out[...] = np.nan
     try:
@@ -157,7 +157,7 @@ def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out:
 
 
 def _state(y: Array) -> Array:
-    """A state (m,) that user-defined code may store, and may not change."""
+    """Return a read-only copy of a state, (m,), which user-defined code may store."""
     x = y[:, 0].copy()
     x.setflags(write=False)
     return x
@@ -171,21 +171,21 @@ def system(
     seen: Array | None = None,
     exact: bool = True,
 ) -> System:
-    """The equation y' = f(t, y) on one segment.
+    """Return the equation y' = f(t, y) on one segment.
 
     Args:
-        functions: Of the state equation, in Python.
+        functions: Functions of the state equation, in Python.
         equation: The state equation.
-        p: Of the segment.
-        run_parameters: u of a sampled controller, in zero-order hold, (n, 1), or nothing, (0, 1).
-        seen: Where the velocity and the actuation of each evaluation are written, (2n,).
-        exact: Whether derivatives are those of the functions, if they have them.
+        p: Numbers of the segment.
+        run_parameters: Torques of a sampled controller in zero-order hold, (n, 1); (0, 1) without one.
+        seen: Array for v and u of the latest evaluation, (2n,), or None.
+        exact: True to use the Jacobian of `functions` if there is one; False for differences.
     """
     n, m = equation.plant.dynamics.n, equation.size
     out, J = np.empty((m + n, 1)), np.empty((m + 1, m, 1))
 
     def rate(t: Any, y: Array) -> Array:
-        if y.ndim > 1:  # an implicit method asks for its Jacobian
+        if y.ndim > 1:  # states of the differences for a Jacobian
             return np.array([rate(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
         evaluate(functions.rate, float(t), np.ascontiguousarray(y)[:, None], p, run_parameters, out)
         if seen is not None:

@@ -1,5 +1,5 @@
 """The error of a run.
 
-- estimate: which companion runs are needed; verdicts: the error from their differences, and what it rests on.
+- estimate: choice of the companion runs; verdicts: the error from their differences, and its basis.
 - requested_accuracy: trial runs until the estimated error is at most the requested one.
 """

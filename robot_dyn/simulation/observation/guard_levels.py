@@ -13,6 +13,7 @@ from robot_dyn.effects.effect import Bound, Effect
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.observation.remarks import RemarkKind
 
 _ROUNDING = 1e-9  # of a limit: a smaller distance counts as reached
@@ -58,7 +59,9 @@ class GuardLevels(NamedTuple):
 NO_LEVELS = GuardLevels((), np.empty((0, 1)), np.empty((0, 1)))
 
 
-def guard_levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> GuardLevels:
+def guard_levels(
+    dynamics: Dynamics, effects: Iterable[Effect], controller: Controller | None, W: int = 1
+) -> GuardLevels:
     """Return all levels of a plant under a controller.
 
     Args:
@@ -85,7 +88,7 @@ def guard_levels(dynamics: Any, effects: Iterable[Effect], controller: Controlle
 
 
 def _bounds(
-    dynamics: Any, effects: tuple[Effect, ...], controller: Controller | None
+    dynamics: Dynamics, effects: tuple[Effect, ...], controller: Controller | None
 ) -> Iterator[tuple[RemarkKind, int, int, np.ndarray, float]]:
     """Yield kind, 0, 1, 2 for q, v, u, side, bounds (n,) or (W, n), and the relative excess that counts as passed."""
     n, robot = dynamics.n, getattr(dynamics, "robot", dynamics)

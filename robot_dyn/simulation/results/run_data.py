@@ -141,7 +141,7 @@ class RunData(Derived):
         return f"<{type(self).__name__}: {self.summary}>"
 
 
-def taken(values: Any, part: slice) -> Any:
+def taken(values: np.ndarray | dict[str, np.ndarray] | None, part: slice) -> np.ndarray | dict[str, np.ndarray] | None:
     """Return a part of an array along its first axis, or of all arrays of a dictionary; None for None."""
     if isinstance(values, dict):
         return {name: x[part] for name, x in values.items()}

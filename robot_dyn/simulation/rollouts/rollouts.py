@@ -1,8 +1,8 @@
-"""Rollouts: one setup from many starts, or with many values of its parameters, side by side in machine code.
+"""Runs of one setup from many starts, or with many values of its parameters, side by side in machine code.
 
     q' = v,   v' = M⁻¹ (τ − C v − N)   for 64 runs side by side, on all threads
 
-Each run is a lane of a tile, and no lane depends on another: one that diverges leaves the rest as they are.
+Each run is a lane of a tile, and no lane depends on another: a run that diverges does not change the others.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from robot_dyn.codegen.parameters import CONTROLLER, Parameter, names_of, parameters, sweepable_parameters
+from robot_dyn.codegen.parameters import CONTROLLER, Parameter, names_of, parameters, variable_parameters
 from robot_dyn.codegen.threads import thread_count
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
@@ -40,89 +41,95 @@ from robot_dyn.simulation.setup.checks import check_stops
 from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
 from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup, check_batch
 
-LARGEST_NUMBER = 2**53  # of a run
+LARGEST_NUMBER = 2**53  # largest number of a run
 RECORDS = ("q", "v", "u", "energy", "work")
 
 
 @takes_options
 def rollouts(
     what: Setup | Plant | Dynamics,
-    q0: Any = None,
-    v0: Any = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
     *,
-    params: Mapping[str, Any] | None = None,
+    vary: Mapping[str, ArrayLike] | None = None,
     record: Iterable[str] = ("q", "v"),
     cuts: bool = True,
-    numbers: Any = None,
+    numbers: ArrayLike | None = None,
     threads: int | None = None,
-    most_bytes: int = MOST_BYTES,
+    max_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Rollouts:
-    """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
+    """Run a plant or a robot from many starts, or a setup with other options.
 
-    Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
-    `method="RK4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
-    (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each thread,
-    with steps that end there, in a few milliseconds a run. So are all runs by a method
-    that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
-    that come and go, or events end steps, or where samples lie between the ends of steps that may be cut.
+    Each run equals that of `simulate`, to rounding. With an explicit, Gauss or Rosenbrock method of fixed step, for
+    example `method="RK4"`, and with time stepping, the runs are in lock step in machine code. Runs that may pass a
+    threshold (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each
+    thread, with steps that end there, which takes a few milliseconds a run.
+
+    All runs are one after the other on each thread if the method chooses its steps, as the default does. With a fixed
+    step they are, too, if dry friction, rigid stops, switched payloads or events end steps, or if samples lie between
+    the ends of steps that may be cut.
 
     Args:
-        what: What to run.
+        what: A plant, a robot or a setup.
         q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
-        v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; 0, or those of the setup, unless given.
-        params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
-            {"kp": …}, a coefficient of an effect, as {"viscous_friction.viscous": …} (of several of a kind
-            {"external_wrench 2.wrench": …}), "gravity", (B, 3), or of a
-            payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
-            "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
-            `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
-            their own values: they are "model.gravity", ….
-        record: Which of "q", "v", "u", "energy", "work" to record at the samples; states of effects and controllers are
-            those of `simulate`.
-        cuts: False for runs in lock step whose steps do not end at thresholds, which the summary then names: faster,
-            and wrong by as much as a step that passes one.
-        numbers: Numbers of the runs, of which their noise is, (B,); 0 to B − 1 unless given. The bits of a run depend
-            on its number, start and parameters, not on the runs beside it.
+        v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; by default 0, or those of the setup.
+        vary: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.parameters` lists the names:
+            gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
+            of a kind, "external_wrench 2.wrench"; "gravity", (B, 3); mass in [kg] and centre of mass of a payload on a
+            link, "payload_mass:tool0" and "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and
+            inertia of a link, see `Robot.with_`, "link3.mass" and "link3.inertia", (B, 3, 3). Models of controllers
+            have separate values: "model.gravity", ….
+        record: Quantities to record at the samples: some of "q", "v", "u", "energy", "work". Only `simulate` records
+            states of effects and controllers.
+        cuts: False for runs in lock step whose steps do not end at thresholds; the summary then names these. Such runs
+            are faster, with the error of a step that passes a threshold.
+        numbers: Numbers of the runs, which determine their noise, (B,); by default 0 to B − 1. The bits of a run depend
+            on its number, start and parameters, not on the other runs.
         threads: Number of threads; None for all processors.
-        most_bytes: Refuse to record more than this.
-        on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
-            a record period of 0 it grows as tiles of 64 runs end.
-        **options: As of `simulate`; all but `estimate_error` and `accuracy`, which have no effect here: no error is
-            estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
-            machine code; "interpreted" executes the runs one after the other in Python.
+        max_bytes: Refuse to record more than this.
+        on_progress: Called with the mean time that the runs have reached, in [s], some ten times a second; with a
+            record period of 0 it grows as tiles of 64 runs end.
+        **options: Options of `simulate`, except `estimate_error` and `accuracy`, which have no effect here: no error is
+            estimated (`simulate` one of the runs for that). The method "auto" means DOP853 here, and the engine "auto"
+            means machine code; "interpreted" executes the runs one after the other in Python.
 
-    Runs are observed at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
-    in how many a limit or a stop is reached or passed. In lock step the actuation of a continuous controller is watched
-    at samples and at least 200 instants, or every step if there are fewer; whether it reverses at every step is not.
-    Likewise where the reference does not begin as the joint does, or moves a joint that friction holds. The other
-    remarks of `simulate` are on single runs alone.
+    Runs are observed at every step. `Rollouts.remarks` counts the runs whose actuation reverses at every tick, that
+    reach or pass a limit or a stop, whose reference starts at another state than the joint, or whose reference moves a
+    joint that friction holds. In lock step the actuation of a continuous controller is observed at samples and at 200
+    or more instants, or at every step if there are fewer; its reversals are not detected. The other remarks of
+    `simulate` are made for single runs only.
 
     Returns:
-        The runs, in the order given. Ctrl-C ends them; what was recorded is returned.
+        The runs, in the order given. After Ctrl-C they contain the samples recorded up to then.
 
     Raises:
-        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
-        TraceError: If a part of the setup cannot be compiled; names it.
+        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `max_bytes`.
+        TraceError: If a part of the setup cannot be compiled; the message names it.
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
     if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
         setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
-    most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
+    max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1)
     if not setup.method.plain:
         raise QueryError(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
             f" {setup.method.name}: give method='RK4' and its step_s; simulate takes any method"
         )
-    if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
-        raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
-    batch = batch_of(setup, q0, v0, params or {}, record, numbers)
-    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
+    if vary is not None and not (isinstance(vary, Mapping) and all(isinstance(name, str) for name in vary)):
+        raise QueryError(f"vary must give values by name, such as {{'kp': …}}, got {shown(vary)}")
+    batch = batch_of(setup, q0, v0, vary or {}, record, numbers)
+    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), max_bytes, on_progress)
 
 
 def batch_of(
-    setup: Setup, q0: Any, v0: Any, params: Mapping[str, Any], record: Iterable[str], numbers: Any = None
+    setup: Setup,
+    q0: ArrayLike | None,
+    v0: ArrayLike | None,
+    vary: Mapping[str, ArrayLike],
+    record: Iterable[str],
+    numbers: ArrayLike | None = None,
 ) -> Batch:
     """Return the runs of a setup; arguments and errors as in `rollouts`."""
     if (recorded := several(record)) is None:
@@ -131,12 +138,12 @@ def batch_of(
     names = setup.plant.dynamics.joint_names
     q = joint_values("q0", setup.q0 if q0 is None else q0, names)
     v = joint_values("v0", setup.v0 if v0 is None else v0, names)
-    sweep = {name: _values(setup, name, x) for name, x in params.items()}
+    sweep = {name: _values(setup, name, x) for name, x in vary.items()}
     counts, n = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}, len(names)
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
-        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
-        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
-        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in vary.items()}
+        rows = f"q0 and v0 ({n},) or (B, {n}), values of vary (B,) or (B, …)"
+        raise QueryError(f"q0, v0 and vary must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
     B = counts.pop()
     q, v = (np.broadcast_to(x, (B, n)) for x in (q, v))
     batch = Batch(setup, q, v, sweep, recorded, None if numbers is None else _numbers(numbers, B))
@@ -146,19 +153,19 @@ def batch_of(
     return batch
 
 
-def _numbers(given: Any, count: int) -> np.ndarray:
+def _numbers(values: ArrayLike, count: int) -> np.ndarray:
     """Return numbers of runs, (B,)."""
-    array = numbers("numbers", given, ("B",), least=0)
+    array = numbers("numbers", values, ("B",), least=0)
     if array.shape != (count,) or (array != np.floor(array)).any() or array.max() > LARGEST_NUMBER:
         raise QueryError(f"numbers: give a whole number of each of the {count} runs, 0 to {LARGEST_NUMBER:g}")
     return array.astype(np.int64)
 
 
 def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
-    """Return the runs of a batch in groups that go alike, with thresholds.
+    """Return the runs of a batch in groups by stepping strategy, with their thresholds.
 
-    A batch in which some run has a threshold detects what passes it; its runs without any go apart from it, as they go
-    in a batch of such runs alone.
+    A batch in which some runs have thresholds detects their passage. Its other runs form a separate group, whose bits
+    are the same as in a batch without thresholds.
     """
     runs, passed = np.arange(len(batch)), batch.thresholds
     if passed is None or passed.some.all():
@@ -168,15 +175,17 @@ def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
 
 
 def run_batch(
-    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
+    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, max_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
     """Return the rollouts of a batch with thresholds `passed`."""
     setup, why = batch.setup, batch.why_one_by_one
     if not cuts and why:
-        raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
-    check_batch(setup, len(batch), sum(batch.sizes.values()), most_bytes)
-    cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
+        raise QueryError(f"cuts=False: {why}, so the runs are not in lock step; leave it out")
+    check_batch(setup, len(batch), sum(batch.sizes.values()), max_bytes)
+    cut = (
+        passed is not None or setup.finds_events
+    )  # samples are then interpolated within steps, which lock step does not support
     if why or (cuts and cut and not setup.samples_on_steps):
         record = one_by_one(batch, threads, on_progress)
     else:
@@ -195,13 +204,13 @@ def run_batch(
         work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
         ends=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
-        about=about | setup.about, params=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
+        about=about | setup.about, varied=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
         observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,
     )  # fmt: skip
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:
-    """Return the setup of all runs; of a plant or robot, with the first start as its own."""
+    """Return the setup of all runs; for a plant or robot, with the first start."""
     start = {}
     if not isinstance(what, Setup):
         what = what if isinstance(what, Plant) else Plant(what)
@@ -219,29 +228,30 @@ def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """Return the values of a parameter, (B, size)."""
     plant, controller = setup.plant, setup.controller
-    known = parameters(plant.dynamics, plant.effects, controller, (name, "armature", "mass_scale"))
-    mine = [parameter for parameter in known if parameter.declared.swept and parameter.name == name]
-    if not mine:
-        raise QueryError(f"params: {_unknown(setup, name)}")
-    size, shape, declared = mine[0].size, mine[0].value.shape, mine[0].declared
-    shapes = (("B",), ("B", 1), ("B", size)) if declared.of_joints or size == 1 else (("B", *shape),)
+    declared = parameters(plant.dynamics, plant.effects, controller, (name, "armature", "mass_scale"))
+    matches = [parameter for parameter in declared if parameter.declared.can_vary and parameter.name == name]
+    if not matches:
+        raise QueryError(f"vary: {_unknown(setup, name)}")
+    size, shape, limits = matches[0].size, matches[0].value.shape, matches[0].declared
+    shapes = (("B",), ("B", 1), ("B", size)) if limits.of_joints or size == 1 else (("B", *shape),)
     array = numbers(
-        f"params: {name}", values, *shapes,
-        least=declared.least, above=declared.above, infinite=declared.infinite,
+        f"vary: {name}", values, *shapes,
+        least=limits.least, above=limits.above, infinite=limits.infinite,
     )  # fmt: skip
     rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), size)))
-    for parameter in mine:
+    for parameter in matches:
         for row in np.unique(rows, axis=0):
             _check(setup, parameter, row.reshape(shape))
     return rows
 
 
 def _check(setup: Setup, parameter: Parameter, value: np.ndarray) -> None:
-    """Build the part of a parameter with a value: it raises an error for one that has no meaning."""
+    """Build the part of a parameter with a value, to raise an error for an invalid one."""
     place, key = parameter.part, parameter.key
     if key.startswith("inertia "):
         Edits().with_((), inertias={key.partition(" ")[2]: value})
     elif place == CONTROLLER and "." in key:
+        assert setup.controller is not None
         rebuilt(setup.controller, {key: value})
     elif place[0] == "effect":
         effect: Any = setup.plant.effects[int(place[1])]
@@ -250,13 +260,13 @@ def _check(setup: Setup, parameter: Parameter, value: np.ndarray) -> None:
 
 
 def _unknown(setup: Setup, name: str) -> str:
-    """Return why a name is not that of a parameter, and the remedy."""
+    """Return why a name is not a parameter, and the remedy."""
     effects, (part, _, key) = setup.plant.effects, name.rpartition(".")
-    known = [parameter.name for parameter in sweepable_parameters(setup.plant.dynamics, effects, setup.controller)]
+    names = [parameter.name for parameter in variable_parameters(setup.plant.dynamics, effects, setup.controller)]
     if alike := [other for other in names_of(effects) if re.fullmatch(rf"{re.escape(part)} \d+", other)]:
         both = " and ".join(repr(f"{other}.{key}") for other in dict.fromkeys(alike))
         return f"{name} names a coefficient of several effects of the plant; give {both}"
-    if name.startswith("payload_") and not any(other.startswith("payload_") for other in known):
+    if name.startswith("payload_") and not any(other.startswith("payload_") for other in names):
         payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
-        return f"no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
-    return f"no {name!r}; {nearest(name, dict.fromkeys(known))}"
+        return f"no {name!r}: the arm has no payload; add one with robot.with_(payload={payload})"
+    return f"no {name!r}; {nearest(name, dict.fromkeys(names))}"

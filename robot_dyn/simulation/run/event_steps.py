@@ -228,9 +228,7 @@ def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
     controls_error, every = setup.method.controls_error, not setup.record_every_s
     period = setup.record_every_s or (setup.duration_s / _SAMPLES if controls_error else inf)
     share_period = setup.duration_s / _COMPARED if controls_error and setup.estimate_error else inf
-    return loop_config(
-        setup.equation,
-        alone=True,
+    return loop_config(setup.equation, alone=True)._replace(
         sample_period=float(period) if samples else inf,
         share_period=float(share_period),
         samples_nodes=samples and every,

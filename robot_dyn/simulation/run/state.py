@@ -121,4 +121,4 @@ class RunState:
 
 def single_run_config(setup: Setup) -> LoopConfig:
     """Return the settings of the loop of a single run that shares no states."""
-    return loop_config(setup.equation, True)
+    return loop_config(setup.equation, alone=True)

@@ -69,5 +69,5 @@ def _differing_edits(model: Any, dynamics: Any) -> tuple[list[str], list[str]]:
 def span(reference: Reference) -> str:
     """Return the start, the end and the duration of a reference, in words."""
     pieces = reference.polynomials.values()
-    start, end = min(piece.start for piece in pieces), max(piece.end for piece in pieces)
+    start, end = min(piece.start_s for piece in pieces), max(piece.end_s for piece in pieces)
     return f"{start:g} to {end:g} s, {end - start:g} s long" if end > start else "constant"

@@ -135,7 +135,7 @@ def _motion(reference: Reference) -> str:
     parts = reference.polynomials.values()
     attributes = [x for part in (reference, *parts) for x in vars(part).values()]
     numbers = [np.asarray(x, dtype=float) for x in attributes if isinstance(x, np.ndarray)]
-    ends = [part.end for part in parts if isinstance(part, PiecewisePolynomial)]
+    ends = [part.end_s for part in parts if isinstance(part, PiecewisePolynomial)]
     until = f", to {max(ends):g} s" if ends else ""
     return f"{type(reference).__name__}{until}, numbers {_digest(*numbers)}"
 

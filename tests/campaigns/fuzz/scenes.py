@@ -32,7 +32,7 @@ bristle_damping_N_m_s_per_rad = {hinge = 0.1}
 viscous_N_m_s_per_rad = 0.2
 coulomb_N_m = 0.5
 static_N_m = 0.7
-stribeck_velocity_rad_per_s = 0.1
+stribeck_velocity_rad_s = 0.1
 [[effect]]
 kind = "line_spring_damper"
 frame = "pole"
@@ -45,7 +45,7 @@ kind = "actuator_lag"
 time_constant_s = 0.05
 [control]
 kind = "pid"
-frequency_rad_per_s = 10.0
+bandwidth_rad_s = 10.0
 [control.model]
 mass_scale = 1.1
 [[control.model.effects]]

@@ -117,7 +117,7 @@ def test_the_work_of_the_motors_is_the_change_of_potential_energy_and_what_frict
     gained = loaded.potential_energy(q[-1]) - loaded.potential_energy(q[0])
     given = sum(each.energy - each.regenerated for each in found.joints)
     assert given == pytest.approx(gained + taken, rel=1e-7)
-    assert given == pytest.approx(found.duration * sum(each.mean_power for each in found.joints), rel=1e-9)
+    assert given == pytest.approx(found.duration_s * sum(each.mean_power for each in found.joints), rel=1e-9)
 
 
 def test_a_joint_breaks_away_against_its_load_and_static_friction() -> None:
@@ -317,14 +317,14 @@ def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() ->
     plant = rd.Plant(UR5, FRICTION[:1])
     found = budget(rd.control.PiecewisePolynomial(breaks, table), plant, payload=LOAD)
     fast = fastest(found)
-    assert fast.strokes == 2 and fast.before == pytest.approx(3.9) and 0.4 < fast.duration < 2.0
-    t = np.linspace(0, fast.duration, 10_000)
+    assert fast.strokes == 2 and fast.before_s == pytest.approx(3.9) and 0.4 < fast.duration_s < 2.0
+    t = np.linspace(0, fast.duration_s, 10_000)
     q, v, a = fast.plan.reference.at(t)
     loaded = rd.Plant(UR5.with_(payload=LOAD), FRICTION[:1])
     assert (np.abs(loaded.inverse_dynamics(q, v, a, t=0.0)) <= 1.001 * UR5.effort_limit).all()
     assert (np.abs(v) <= 1.001 * UR5.velocity_limit).all()
     at_rest = np.abs(v).max(axis=1) == 0
-    assert at_rest.mean() * fast.duration == pytest.approx(0.4, abs=1e-3)
+    assert at_rest.mean() * fast.duration_s == pytest.approx(0.4, abs=1e-3)
     np.testing.assert_allclose(q[at_rest][1:-1], np.tile(POINTS[2], (at_rest.sum() - 2, 1)), atol=1e-9)
     for start, end, part in ((0, 2, q[: np.argmax(at_rest[1:])]), (2, 1, q[len(q) - np.argmax(at_rest[::-1][1:]) :])):
         along = (POINTS[end] - POINTS[start]) / np.linalg.norm(POINTS[end] - POINTS[start])
@@ -340,7 +340,7 @@ def test_the_fastest_motion_is_slowed_down_until_it_keeps_continuous_torque() ->
     found = budget(PLAN, UR5, payload=LOAD, continuous=lasting)
     fast, free = fastest(found), fastest(budget(PLAN, UR5, payload=LOAD))
     assert free.slowed == 1.0 and fast.slowed > 1.0
-    assert fast.duration == pytest.approx(fast.slowed * free.duration, rel=1e-12)
+    assert fast.duration_s == pytest.approx(fast.slowed * free.duration_s, rel=1e-12)
     used = max(each.rms / each.continuous_limit for each in fast.budget.joints)
     assert used == pytest.approx(1.0, abs=1e-6) and fast.budget.fits and "slowed down by" in repr(fast)
     held = fastest(budget(PLAN, UR5, payload=LOAD, continuous=lasting / 3))
@@ -387,7 +387,7 @@ def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
     points = np.radians([[0, -90, 90, -90, -90, 0], [50, -60, 90, -120, -90, 20], [100, -80, 100, -100, -90, 0]])
     motion = rd.control.from_samples(arm, points, time=[0.0, 0.3, 0.6], unit="rad").reference
     load = rd.Payload("tool0", 5.0, (0.0, 0.0, 0.1))
-    (model, data), t = with_appended_body(arm, load), np.linspace(0, motion.end, 2000)
+    (model, data), t = with_appended_body(arm, load), np.linspace(0, motion.end_s, 2000)
 
     def share(factor: float) -> float:
         states = zip(*(x / factor**k for k, x in enumerate(motion.at(t))), strict=True)
@@ -406,10 +406,13 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
     given = budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
     fast = fastest(given)
     assert (
-        fast.given and fast.budget is given and fast.duration == fast.before and fast.plan.reference is PLAN.reference
+        fast.given
+        and fast.budget is given
+        and fast.duration_s == fast.before_s
+        and fast.plan.reference is PLAN.reference
     )
     assert "the original motion, which fits" in repr(fast)
-    half = fastest(given, share=0.4)
+    half = fastest(given, fraction=0.4)
     assert not half.given and "at 40 % of the peak torques" in repr(half)
 
 
@@ -441,7 +444,9 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
     assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
     assert refusal(["budget", "ur5"]).startswith("ur5: give a motion as well")
     assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
-    assert "--share is for the fastest motion: add --fastest" in refusal(["budget", "ur5", plan, "--share", "0.9"])
+    assert "--fraction is for the fastest motion: add --fastest" in refusal(
+        ["budget", "ur5", plan, "--fraction", "0.9"]
+    )
     assert "--joint must be JOINT=COLUMN" in refusal(["budget", "ur5", plan, "--joint", "J1"])
     assert "--max-payload must be LINK@X,Y,Z" in refusal(["budget", "ur5", plan, "--max-payload", "tool0@1"])
 
@@ -470,9 +475,9 @@ def test_the_command_ends_with_1_if_the_fastest_motion_or_the_given_one_is_too_s
     """And its figure and table are those of the fastest one; its document has the keys of its page."""
     answer = document("budget", "ur5", files / "plan.csv", "--fastest")
     assert answer["fastest"].keys() == names(promised_keys()["fastest"].partition(": ")[2])
-    assert answer["fastest"]["budget"]["fits"] and answer["fastest"]["duration"] < answer["duration"]
+    assert answer["fastest"]["budget"]["fits"] and answer["fastest"]["duration_s"] < answer["duration_s"]
     plan, motors = files / "plan.csv", files / "motors.csv"
-    done = ran("budget", "ur5", plan, "--fastest", "--share", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
+    done = ran("budget", "ur5", plan, "--fastest", "--fraction", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
     assert done.returncode == 0 and "at 90 % of the peak torques" in done.stdout
     assert "the same path at its limits" in (files / "b.svg").read_text(encoding="utf-8")
     heavy = ran("budget", "ur5", plan, "--limits", motors, "--fastest", "--payload", "wrist_3_link=5kg@0.12,0.03,0.05")
@@ -493,7 +498,7 @@ def test_the_command_takes_columns_by_name(files: Path) -> None:
 
 
 def test_the_command_takes_scenes_and_runs_and_writes_figure_and_table(files: Path) -> None:
-    run = rd.save_run(rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05), files / "run")
+    run = rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05).save(files / "run")
     (files / "scene.toml").write_text('robot = "simple_pendulum"\nduration_s = 0.05\n[start]\nq = [0.4]\n')
     for what in (run, files / "scene.toml"):
         assert ran("budget", what).returncode == 0

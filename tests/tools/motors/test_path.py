@@ -54,7 +54,7 @@ def test_no_torque_is_above_its_limit_and_nearly_always_one_limit_binds(name: st
     }[friction]
     plant = rd.Plant(robot, effects)
     found = rd.tools.motors.path(plant, _way_points(robot, seed=3))
-    q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
+    q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration_s / 10_000)
     torque = np.abs(plant.inverse_dynamics(q, v, a, t=0.0)) / robot.effort_limit
     speed = np.abs(v) / robot.velocity_limit
     assert torque.max() <= 1.001
@@ -69,7 +69,7 @@ def test_one_joint_between_two_points_takes_twice_the_square_root_of_distance_ov
     robot = rd.load("simple_pendulum").with_(gravity=WITHOUT_GRAVITY)
     inertia = float(robot.M(np.array([0.3]))[0, 0])
     found = rd.tools.motors.path(robot, [[0.2], [1.7]], effort=2.5)
-    assert found.duration == pytest.approx(2 * np.sqrt(1.5 * inertia / 2.5), rel=1e-4)
+    assert found.duration_s == pytest.approx(2 * np.sqrt(1.5 * inertia / 2.5), rel=1e-4)
 
 
 @toppra
@@ -94,8 +94,8 @@ def test_one_joint_with_viscous_friction_takes_the_time_of_its_linear_equation()
         low, high = (middle, high) if motion(middle)[1] < distance else (low, middle)
     plant = rd.Plant(robot, [rd.effects.ViscousFriction(b)])
     found = rd.tools.motors.path(plant, [[-1.0], [-1.0 + distance]], effort=tau)
-    assert found.duration == pytest.approx(motion(low)[0], rel=2e-3)
-    assert found.duration > motion(low)[0]  # nothing is faster than the optimum
+    assert found.duration_s == pytest.approx(motion(low)[0], rel=2e-3)
+    assert found.duration_s > motion(low)[0]  # nothing is faster than the optimum
 
 
 @toppra
@@ -112,27 +112,27 @@ def test_a_planar_arm_takes_the_time_of_the_phase_plane() -> None:
         bounds = (sign * np.sign(A) * limits - rest) / A
         return bounds.min() if sign > 0 else bounds.max()
 
-    tight = {"rtol": 1e-10, "atol": 1e-14, "dense_output": True, "max_step": path.end / 50}
-    forward = solve_ivp(lambda s, x: [2 * extreme(s, x[0], 1)], (0.0, path.end), [1e-12], **tight).sol
-    backward = solve_ivp(lambda s, x: [2 * extreme(s, x[0], -1)], (path.end, 0.0), [1e-12], **tight).sol
+    tight = {"rtol": 1e-10, "atol": 1e-14, "dense_output": True, "max_step": path.breaks[-1] / 50}
+    forward = solve_ivp(lambda s, x: [2 * extreme(s, x[0], 1)], (0.0, path.breaks[-1]), [1e-12], **tight).sol
+    backward = solve_ivp(lambda s, x: [2 * extreme(s, x[0], -1)], (path.breaks[-1], 0.0), [1e-12], **tight).sol
     r = np.linspace(0, 1, 20_001)
-    s = path.end * (3 * r**2 - 2 * r**3)  # ds/√x stays finite at rest
+    s = path.breaks[-1] * (3 * r**2 - 2 * r**3)  # ds/√x stays finite at rest
     x = np.minimum(forward(s)[0], backward(s)[0])
     inside = slice(1, -1)
-    rate = path.end * 6 * (r - r**2)[inside] / np.sqrt(x[inside])
+    rate = path.breaks[-1] * 6 * (r - r**2)[inside] / np.sqrt(x[inside])
     duration = np.concatenate([[rate[0]], rate, [rate[-1]]])
     found = rd.tools.motors.path(robot, ends, effort=limits)
-    assert found.duration == pytest.approx(float(np.trapezoid(duration, r)), rel=1e-3)
+    assert found.duration_s == pytest.approx(float(np.trapezoid(duration, r)), rel=1e-3)
 
 
 def test_the_motion_is_the_path_with_the_speed_exactly() -> None:
     """q(s(t)), q' ṡ and q' s̈ + q'' ṡ², to the rounding of polynomials of degree 6."""
     path = through(np.random.default_rng(5).uniform(-1, 1, (4, 3)))
-    s = np.unique(np.concatenate([path.breaks, np.linspace(0, path.end, 40)]))
+    s = np.unique(np.concatenate([path.breaks, np.linspace(0, path.breaks[-1], 40)]))
     x = 0.3 + np.cos(2.1 * s) ** 2
     motion = in_time(path, s, x)
     u = np.diff(x) / (2 * np.diff(s))
-    t = np.random.default_rng(6).uniform(0, motion.end, 200)
+    t = np.random.default_rng(6).uniform(0, motion.end_s, 200)
     k = np.searchsorted(motion.breaks, t, side="right") - 1
     h = t - motion.breaks[k]
     at, speed = s[k] + np.sqrt(x[k]) * h + u[k] / 2 * h**2, np.sqrt(x[k]) + u[k] * h
@@ -151,13 +151,13 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
     """
     arm = rd.load("ur5").with_(payload=rd.Payload("tool0", 2.0))
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.2 * arm.effort_limit / arm.velocity_limit)])
-    found = rd.tools.motors.path(plant, WAY, share=0.95, velocity=0.98 * arm.velocity_limit)
+    found = rd.tools.motors.path(plant, WAY, fraction=0.95, velocity=0.98 * arm.velocity_limit)
     gains = [4000.0] * 3 + [800.0] * 3, [160.0] * 3 + [16.0] * 3
     controller = rd.control.FeedForward(arm, found.reference, *gains)
     run = rd.simulate(
         plant,
         WAY[0],
-        duration_s=found.duration,
+        duration_s=found.duration_s,
         controller=controller,
         method="RK4",
         step_s=2e-3,
@@ -175,9 +175,9 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
 def test_more_torque_is_faster_and_the_path_is_the_same() -> None:
     robot = rd.load("ur5")
     points = _way_points(robot, seed=8)
-    slow, fast = (rd.tools.motors.path(robot, points, share=share) for share in (0.6, 1.0))
-    assert fast.duration < slow.duration
-    passed = fast.reference.at(np.linspace(0, fast.duration, 20_000))[0]
+    slow, fast = (rd.tools.motors.path(robot, points, fraction=share) for share in (0.6, 1.0))
+    assert fast.duration_s < slow.duration_s
+    passed = fast.reference.at(np.linspace(0, fast.duration_s, 20_000))[0]
     for point in points:
         assert np.abs(passed - point).max(axis=1).min() < 2e-3  # what it moves in 1/20 000 of the time
 
@@ -188,7 +188,7 @@ def test_a_polynomial_counts_as_a_path_alone() -> None:
     slow = rd.control.PiecewisePolynomial([0.0, 100.0], [[[0.1, 0.2], [0.01, -0.02], [1e-5, 3e-5]]])
     once = rd.control.PiecewisePolynomial([5.0, 6.0], [[[0.1, 0.2], [1.0, -2.0], [0.1, 0.3]]])
     first, second = (rd.tools.motors.path(robot, each, effort=60.0) for each in (slow, once))
-    assert first.duration == pytest.approx(second.duration, rel=1e-4)
+    assert first.duration_s == pytest.approx(second.duration_s, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effect
         ("ur5", [[0.1] * 6, [0.1] * 6, [0.3] * 6], {}, "equal"),
         ("planar_2r", [[0.3, -0.4], [0.7, 1e308]], {}, r"points must be within 1e\+100 rad or m, got 1e\+308"),
         ("ur5", [[0.1] * 6, [9.0] * 6], {}, "outside its limits"),
-        ("ur5", [[0.1] * 6, [0.5] * 6], {"share": 1.2}, "at most 1"),
+        ("ur5", [[0.1] * 6, [0.5] * 6], {"fraction": 1.2}, "at most 1"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": {"elbow": 3.0}}, "elbow"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": 3.0}, "'shoulder_lift_joint' needs"),
         ("planar_2r", [[0.1] * 2, [0.5] * 2], {}, "nothing limits"),
@@ -245,9 +245,9 @@ def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
     robot = rd.load("ur5")
     found = rd.tools.motors.path(robot, _way_points(robot, seed=3))
     text = repr(found)
-    assert f"{found.duration:.6g} s" in text
+    assert f"{found.duration_s:.6g} s" in text
     assert "shoulder_pan_joint" in text
-    assert found.phases[0].start == pytest.approx(0.0, abs=0.01 * found.duration)
+    assert found.phases[0].start == pytest.approx(0.0, abs=0.01 * found.duration_s)
     assert all(first.end <= second.start + 1e-12 for first, second in zip(found.phases, found.phases[1:], strict=False))
     assert "<svg" in found.drawing
     assert '"at_limits"' in found.to_json()
@@ -259,4 +259,4 @@ def test_joints_that_reverse_at_one_place_are_planned() -> None:
     robot = rd.load("ur5")
     found = rd.tools.motors.path(rd.Plant(robot, [rd.effects.DryFriction(5.0)]), WAY)
     assert found.largest <= 1.001 and found.at_limits >= 0.98
-    assert np.diff(found.reference.breaks).min() > 1e-9 * found.duration
+    assert np.diff(found.reference.breaks).min() > 1e-9 * found.duration_s

@@ -34,7 +34,7 @@ def test_the_motion_is_that_of_ruckig() -> None:
         asked.max_velocity, asked.max_acceleration = ARM.velocity_limit, given["acceleration"]
         asked.max_jerk = given["jerk"]
         ruckig.Ruckig(6).calculate(asked, trajectory)
-        assert abs(plan.duration - trajectory.duration) < 1e-12
+        assert abs(plan.duration_s - trajectory.duration) < 1e-12
         t = rng.uniform(0, trajectory.duration, 100)
         expected = np.array([trajectory.at_time(x)[:3] for x in t]).swapaxes(0, 1)
         for mine, its, tolerance in zip(plan.reference.at(0.5 + t), expected, (1e-12, 1e-12, 1e-11), strict=True):
@@ -47,7 +47,7 @@ def test_limits_hold_at_ten_thousand_times_and_accelerations_are_continuous() ->
     for case in (1, 2, 4):
         given = random_case(rng, case)
         plan = rd.tools.motors.point_to_point(ARM, **given)
-        t = np.linspace(plan.reference.start, plan.reference.end, 10_000)
+        t = np.linspace(plan.reference.start_s, plan.reference.end_s, 10_000)
         _, v, a = plan.reference.at(t)
         assert (np.abs(v) <= plan.limits["velocity"] * (1 + 1e-12)).all()
         assert (np.abs(a) <= plan.limits["acceleration"] * (1 + 1e-12)).all()
@@ -55,8 +55,8 @@ def test_limits_hold_at_ten_thousand_times_and_accelerations_are_continuous() ->
         h, c = np.diff(plan.reference.breaks)[:-1, None], plan.reference.coefficients
         before = 2 * c[:-1, 2] + 6 * c[:-1, 3] * h  # the acceleration at the end of each piece
         np.testing.assert_allclose(before, 2 * c[1:, 2], atol=1e-10)
-        q0, v0, _ = plan.reference.at(plan.reference.start)
-        q1, v1, _ = plan.reference.at(plan.reference.end)
+        q0, v0, _ = plan.reference.at(plan.reference.start_s)
+        q1, v1, _ = plan.reference.at(plan.reference.end_s)
         for got, key in ((q0, "q0"), (v0, "v0"), (q1, "q1"), (v1, "v1")):
             np.testing.assert_allclose(got, given[key], atol=1e-10)
 
@@ -83,7 +83,7 @@ def test_of_one_joint_the_duration_is_that_of_the_closed_form(D: float, a: float
     q0, q1 = np.full(6, 0.2), np.full(6, 0.2)
     q1[2] += D * 0.9
     plan = rd.tools.motors.point_to_point(ARM, q0, q1, acceleration=a, jerk=j)
-    assert abs(plan.duration - shortest(0.9 * D, ARM.velocity_limit[2], a, j)) < 1e-9
+    assert abs(plan.duration_s - shortest(0.9 * D, ARM.velocity_limit[2], a, j)) < 1e-9
 
 
 def test_nothing_connects(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +98,7 @@ def test_nothing_connects(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "create_connection", refuse)
     with pytest.raises(AssertionError, match="it connects"):
         socket.create_connection(("localhost", 9))
-    assert rd.tools.motors.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0).duration > 0
+    assert rd.tools.motors.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0).duration_s > 0
 
 
 def test_a_run_follows_it() -> None:
@@ -106,7 +106,7 @@ def test_a_run_follows_it() -> None:
     arm = rd.load("planar_2r")
     plan = rd.tools.motors.point_to_point(arm, [0.1, 0.2], [0.7, -0.3], velocity=1.0, acceleration=3.0, jerk=20.0)
     controller = rd.control.ComputedTorque(arm, plan.reference, kp=100.0, kd=20.0)
-    run = rd.simulate(arm, q0=[0.1, 0.2], duration_s=plan.duration, controller=controller)
+    run = rd.simulate(arm, q0=[0.1, 0.2], duration_s=plan.duration_s, controller=controller)
     np.testing.assert_allclose(run.q[-1], [0.7, -0.3], atol=1e-8)  # the exact model; the method's tolerance is 1e-10
 
 

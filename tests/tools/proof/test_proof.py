@@ -492,7 +492,7 @@ def test_a_reference_may_pass_from_one_polynomial_to_another() -> None:
         rd.tools.proof.prove(setup),
         rd.simulate(replace(setup, method=rd.integrate.Adaptive("DOP853", 1e-13, 1e-14))),
     )
-    assert made.proven and {0.01, float(plan.end), 0.08} <= {node.t for node in made.nodes}
+    assert made.proven and {0.01, float(plan.end_s), 0.08} <= {node.t for node in made.nodes}
     assert run.proven_digits(made) > 11
 
 

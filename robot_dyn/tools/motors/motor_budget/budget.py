@@ -183,7 +183,7 @@ def _budget(
     robot: Robot, method: str, demand: Demand, joints: tuple[JointBudget, ...], limits: str, findings: Iterable[str],
     left_out: Iterable[str], case: Any,
 ) -> MotorBudget:  # fmt: skip
-    motion = f"{method}{'' if case is None else ','} {demand.duration:.6g} s"
+    motion = f"{method}{'' if case is None else ','} {demand.duration_s:.6g} s"
     carried = ", ".join(f"{payload.mass:g} kg on {payload.frame}" for payload in robot.edits.payloads)
     unknown = {
         "peak torque": [x.joint for x in joints if x.peak_limit == inf and x.peak > 0],
@@ -197,7 +197,7 @@ def _budget(
     return MotorBudget(
         robot=robot.name,
         motion=f"{motion}, carrying {carried}" if carried else motion,
-        duration=demand.duration,
+        duration_s=demand.duration_s,
         joints=joints,
         limits=limits,
         resolution=demand.resolution,

@@ -80,7 +80,7 @@ def cells(motion: PiecewisePolynomial, plant: Plant) -> Cells:
     inner = [t for effect in plant.effects for t in effect.switches]
     inner += turning_points(motion).tolist() if plant.forces else []
     ends = _ends(motion.breaks, np.array(inner))
-    longest = (motion.end - motion.start) / FEWEST
+    longest = (motion.end_s - motion.start_s) / FEWEST
     parts = np.ceil(np.diff(ends) / longest).astype(int)
     interval = np.repeat(np.arange(len(parts)), parts)
     k = np.arange(len(interval)) - np.repeat(np.cumsum(parts) - parts, parts)

@@ -62,7 +62,7 @@ class Demand:
         return self.split.tau * self.v
 
     @property
-    def duration(self) -> float:
+    def duration_s(self) -> float:
         """Duration of the motion, in [s]."""
         return float(self.weights.sum())
 

@@ -103,7 +103,7 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
     """Yield the budget of each joint; `cut` names joints whose actuation was cut at an effort limit."""
     split, power, row = demand.split, demand.power, np.arange(len(demand.peak))
     rms = np.sqrt(demand.mean(split.tau**2))
-    delivered, regenerated = (demand.duration * demand.mean(x.clip(0.0)) for x in (power, -power))
+    delivered, regenerated = (demand.duration_s * demand.mean(x.clip(0.0)) for x in (power, -power))
     at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
     parts = {cause: demand.mean(torque * split.tau) for cause, torque in split.torques.items()}
     by_joint = [[(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i] for i in row]

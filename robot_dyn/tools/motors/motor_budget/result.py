@@ -25,7 +25,7 @@ class MotorBudget(Result):
     Attributes:
         robot: Name of the robot.
         motion: Plan or run, in words.
-        duration: Duration, in [s]; means and rms assume that the motion is repeated without a pause.
+        duration_s: Duration, in [s]; means and rms assume that the motion is repeated without a pause.
         joints: Demand, limits and causes of each joint.
         limits: Sources of the limits, in words.
         resolution: Times at which the motion was evaluated, in words.
@@ -42,7 +42,7 @@ class MotorBudget(Result):
     )  # fmt: skip
     robot: str
     motion: str
-    duration: float
+    duration_s: float
     joints: tuple[JointBudget, ...]
     limits: str
     resolution: str

@@ -43,7 +43,7 @@ def path(
     plant: Any,
     points: Any,
     *,
-    share: float = 1.0,
+    fraction: float = 1.0,
     effort: Any = None,
     velocity: Any = None,
     acceleration: Any = None,
@@ -51,17 +51,17 @@ def path(
 ) -> PathPlan:
     """Plan the fastest motion along a path, from rest to rest, within limits of torque, velocity and acceleration.
 
-        minimise T over s(t):  |τ(q, q̇, q̈)| ≤ share · τ_max,  |q̇| ≤ v_max,  |q̈| ≤ a_max  on q = q(s(t))
+        minimise T over s(t):  |τ(q, q̇, q̈)| ≤ fraction · τ_max,  |q̇| ≤ v_max,  |q̈| ≤ a_max  on q = q(s(t))
 
     τ is the plant's inverse dynamics, with all effects. The motion is a polynomial in each of a few hundred pieces, in
     which s̈ is constant: acceleration and torque jump between pieces, as in all time-optimal motions. The limits are
-    checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass share=0.95.
+    checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass fraction=0.95.
 
     Args:
         plant: A plant or an arm.
         points: Way points, (m, n), in [rad] or [m], joined by a natural cubic spline; or a
             `rd.control.PiecewisePolynomial`, whose timing is ignored.
-        share: Fraction of the effort limits that the motion may use, up to 1.
+        fraction: Fraction of the effort limits that the motion may use, up to 1.
         effort: Effort limits, one number, by joint name or (n,), in [N m] or [N]; by default the limits of the motors
             or, without motors, of the robot's file.
         velocity: Velocity limits, one number, by joint name or (n,), in [rad/s] or [m/s]; same default.
@@ -77,11 +77,11 @@ def path(
     Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis, 2018.
     """
     plant = plant if isinstance(plant, Plant) else Plant(plant)
-    share = number("share", share, error=PlanError, above=0.0)
-    if share > 1:
-        raise PlanError(f"share must be at most 1, got {share:g}")
+    fraction = number("fraction", fraction, error=PlanError, above=0.0)
+    if fraction > 1:
+        raise PlanError(f"fraction must be at most 1, got {fraction:g}")
     check_motors(motors)
-    limits = limits_of(plant, motors, effort, velocity, acceleration).times(share)
+    limits = limits_of(plant, motors, effort, velocity, acceleration).times(fraction)
     geometry = geometric_path(points, plant.dynamics.joint_names)
     check_effects(plant)
     check_positions(plant, geometry)
@@ -97,10 +97,10 @@ def path(
     robot: Any = plant.dynamics
     kinds = getattr(robot, "joint_types", ("revolute",) * robot.n)
     by_kind = {"velocity": limits.velocity, "acceleration": limits.acceleration, "torque": limits.effort}
-    method = "path at its limits" + ("" if share == 1 else f", with torques up to {share:.4g} of theirs")
+    method = "path at its limits" + ("" if fraction == 1 else f", with torques up to {fraction:.4g} of theirs")
     return PathPlan(
         Plan(getattr(robot, "name", "arm"), names, kinds, motion, method, by_kind, tuple(findings)),
-        share,
+        fraction,
         largest,
         at_limits,
         elsewhere(judgement, motion.breaks),
@@ -115,7 +115,7 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
         motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
-        judgement = judged(plant, limits, motion, judged_times(motion.end))
+        judgement = judged(plant, limits, motion, judged_times(motion.end_s))
         largest = float(judgement.most.max())
         if largest <= _REFUSED and error <= _ERROR:
             return motion, judgement
@@ -130,14 +130,14 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
     """Return the motion, and the error of its linearised effects as a share of the effort limits."""
     fixed = _apart(path.breaks, turning_points(path)) if plant.forces else path.breaks
     cosine = (1 - np.cos(np.linspace(0, np.pi, _CELLS + 1))) / 2
-    grid = _merged(fixed, path.start + (path.end - path.start) * cosine)
+    grid = _merged(fixed, path.breaks[0] + (path.breaks[-1] - path.breaks[0]) * cosine)
     duration = cells(plant, limits, path, grid, None).expected_duration
-    last = Speed(path.breaks[[0, -1]], np.full(2, ((path.end - path.start) / duration) ** 2))
-    motion, error = hold(path.at(path.start)[0]), inf
+    last = Speed(path.breaks[[0, -1]], np.full(2, ((path.breaks[-1] - path.breaks[0]) / duration) ** 2))
+    motion, error = hold(path.at(path.breaks[0])[0]), inf
     for turn in range(_ROUNDS):
         last, error = _solved(plant, limits, path, grid, last, duration)
         motion = in_time(path, last.s, last.x)
-        duration = motion.end
+        duration = motion.end_s
         if turn == 0:  # change to pieces of about the same duration
             grid = _merged(fixed, _places(last, motion.breaks, np.linspace(0, duration, _CELLS + 1)))
             continue
@@ -176,7 +176,7 @@ def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tup
     most = most.reshape(len(h), -1)
     at_limits = (h[:, None] * (most >= BINDS)).mean(axis=-1).sum() / h.sum()
     above = most.max(axis=-1) > _ABOVE
-    bad = (above | (most.min(axis=-1) < BINDS)) & (h > _SHORTEST * motion.end)
+    bad = (above | (most.min(axis=-1) < BINDS)) & (h > _SHORTEST * motion.end_s)
     return bad, bool(at_limits >= _AT_LIMITS and not above.any())
 
 

@@ -49,9 +49,9 @@ class PathPlan(Answer, Value):
     """The fastest motion along a path; pass `reference` to a controller.
 
     Attributes:
-        plan: The motion, from rest to rest, with limits (torques times `share`) and findings.
-        share: Fraction of the effort limits that it may use.
-        largest: Largest torque, velocity or acceleration as a share of its limit; for torques, of `share` times it.
+        plan: The motion, from rest to rest, with limits (torques times `fraction`) and findings.
+        fraction: Fraction of the effort limits that it may use.
+        largest: Largest torque, velocity or acceleration as a share of its limit; for torques, of `fraction` times it.
         at_limits: Share of the time in which at least one limit is reached to 1 %.
         elsewhere: Reasons for no binding limit in the rest of the time, with the share of each reason.
         bindings: Use of each finite limit.
@@ -60,7 +60,7 @@ class PathPlan(Answer, Value):
     """
 
     plan: Plan
-    share: float
+    fraction: float
     largest: float
     at_limits: float
     elsewhere: dict[str, float]
@@ -77,9 +77,9 @@ class PathPlan(Answer, Value):
         return self.plan.reference
 
     @property
-    def duration(self) -> float:
+    def duration_s(self) -> float:
         """Duration of the motion, in [s]."""
-        return self.plan.duration
+        return self.plan.duration_s
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ class PathPlan(Answer, Value):
         return self.plan.findings
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.plan.arm}: {self.plan.method}: {self.duration:.6g} s from rest to rest"
+        yield f"{self.plan.arm}: {self.plan.method}: {self.duration_s:.6g} s from rest to rest"
         yield f"at a limit for {self.at_limits:.2%} of the time; largest share of a limit {self.largest:.5f}"
         yield from (f"elsewhere, {part:.2%}: {why}" for why, part in self.elsewhere.items())
         rows = tuple((x.joint, x.kind, x.limit, x.largest, f"{x.binds:.1%}") for x in self.bindings)
@@ -96,7 +96,9 @@ class PathPlan(Answer, Value):
 
     @property
     def drawing(self) -> str:
-        return plot("torque, as a share of its limit,", judged_times(self.duration), self.ratios) + legend(self.ratios)
+        return plot("torque, as a share of its limit,", judged_times(self.duration_s), self.ratios) + legend(
+            self.ratios
+        )
 
 
 @final
