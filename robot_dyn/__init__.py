@@ -5,8 +5,8 @@ Other formulations  Lagrangian, compiled, euler_lagrange
 Inspection          info (an arm), why (a torque by cause), explain (the equations of a run), parameters (that can vary)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
-Display             replay, show, plot, save_replay, save_plot, diff_runs
-To keep             save_run, load_run, save_rollouts, load_rollouts, export
+Display             replay, show, plot, diff_runs
+To keep             `.save(path)` of a run, a batch, a page, a figure or a result; read (a run, a batch)
 Results             Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 
 Subpackages, whose docstrings list their contents: effects (friction, springs, stops, limits, …), control (controllers,

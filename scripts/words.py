@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 34,
+    "opening": 33,
     "as of": 10,
     "what without noun": 56,
     "is told": 1,
@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 0,
     "each": 53,
     "arguments": 0,
-    "Any": 564,
+    "Any": 563,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
