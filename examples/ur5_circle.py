@@ -35,7 +35,7 @@ for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mas
         q0=q_start,
         v0=np.zeros(arm.n),
         duration_s=circle.position.end,
-        controller=rd.control.OperationalSpace(model, frame, circle, kp, kd),
+        controller=rd.control.OperationalSpace(model, frame, circle, kp=kp, kd=kd),
         rtol=1e-8,
         atol=1e-10,
         record_every_s=0.01,

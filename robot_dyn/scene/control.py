@@ -151,16 +151,18 @@ class Control(Part):
         kp, kd = self._gains(model, q0)
         if self.kind == "operational_space":
             return OperationalSpace(
-                model, str(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
-                period_s=self.period_s,
+                model, str(self.frame), desired, kp=kp, kd=kd, period_s=self.period_s,
+                posture=q0, posture_kp=kp.max() / 10, posture_kd=2 * np.sqrt(kp.max() / 10),
             )  # fmt: skip
         if self.kind == "pid":
             limit = per_joint("effort_limit_N_m", self.effort_limit_N_m, robot, elsewhere=np.inf)
             limit = stated_efforts(robot) if limit is URDF else limit
-            return PID(desired, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
+            return PID(
+                desired, kp=kp, ki=kp * self.integral_rate_per_s, kd=kd, effort_limit=limit, period_s=self.period_s
+            )
         if self.kind == "pd":
-            return PD(desired, kp, kd, self.period_s)
-        return KINDS[self.kind](model, desired, kp, kd, self.period_s)  # pyright: ignore[reportCallIssue]
+            return PD(desired, kp=kp, kd=kd, period_s=self.period_s)
+        return KINDS[self.kind](model, desired, kp=kp, kd=kd, period_s=self.period_s)  # pyright: ignore[reportCallIssue]
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Return stiffness and damping, as stated or from ω and ζ."""

@@ -19,7 +19,7 @@ from tests.two_rates import TwoRates
 
 T, PERIODS = 0.03, 40
 KP, KD, TARGET = np.array([60.0, 45.0]), np.array([5.0, 4.0]), np.array([0.5, 0.2])
-PD = rd.control.PD(rd.control.hold(TARGET), KP, KD, T)
+PD = rd.control.PD(rd.control.hold(TARGET), kp=KP, kd=KD, period_s=T)
 PLANT = plant()
 NEAR = 1e-11  # rtol 1e-12 over 1.2 s, and rounding of the exponentials
 
@@ -156,7 +156,7 @@ def test_the_integral_of_a_pid_is_that_of_what_is_measured() -> None:
         z.append(z[-1] + T * ki * (TARGET - q))
         return law(k, q, v) + z[-2]
 
-    pid = rd.control.PID(rd.control.hold(TARGET), KP, ki, KD, period_s=T)
+    pid = rd.control.PID(rd.control.hold(TARGET), kp=KP, ki=ki, kd=KD, period_s=T)
     late = rd.control.Loop(pid, measurement_delay=0.75)
     assert differences(run(late), exact(by_hand, T, PERIODS, 0.75)) < NEAR
 
@@ -239,7 +239,7 @@ def test_what_a_loop_costs_is_told_apart_from_its_controller() -> None:
 
 def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
     """They do not change between ticks: the mean of squares of the local error is that of the others."""
-    arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), 0.0, 0.0, 1.0)
+    arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), kp=0.0, kd=0.0, period_s=1.0)
     made = [
         rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, method="DOP853", estimate_error=False)
         for x in (free, rd.control.Loop(free, actuation_delay=50))
@@ -261,7 +261,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     """Damping of 2.24/T reverses at each tick, whether there are one or two instants in a period."""
     M = np.linalg.inv(matrices()[1][2:])
     kd = 2.24 / T / np.abs(np.linalg.eigvals(np.linalg.inv(M))).max()
-    loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), 0.0, kd, T), actuation_delay=late)
+    loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), kp=0.0, kd=kd, period_s=T), actuation_delay=late)
     for integrator in ("RK4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             options = {"method": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
@@ -291,7 +291,7 @@ def test_what_is_rounded_shows_no_order() -> None:
 def test_loops_that_have_no_meaning_are_refused() -> None:
     block, hold = rd.control.Quantisation(1e-3), rd.control.hold(TARGET)
     wrong: list[tuple[object, str]] = [
-        (lambda: rd.control.Loop(rd.control.PD(hold, 1.0, 1.0)), "is continuous"),
+        (lambda: rd.control.Loop(rd.control.PD(hold, kp=1.0, kd=1.0)), "is continuous"),
         (lambda: rd.control.Loop(rd.control.Loop(PD)), "must not be a Loop"),
         (lambda: rd.control.Loop(PD, position=rd.control.Differences()), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[block, rd.control.Differences()]), "first block of velocity"),

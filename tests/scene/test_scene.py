@@ -342,7 +342,7 @@ q = [0.5, 0.1]
 def by_hand() -> rd.control.Loop:
     q = rd.control.hold([0.5, 0.1])
     return rd.control.Loop(
-        rd.control.PD(q, 50.0, [5.0, 4.0], 0.004),
+        rd.control.PD(q, kp=50.0, kd=[5.0, 4.0], period_s=0.004),
         [rd.control.Noise(1e-3), rd.control.Quantisation([1e-4, 2e-4])],
         [rd.control.Differences(), rd.control.LowPass(300.0, 1)],
         [rd.control.LowPass(400.0), rd.control.Quantisation(0.01), rd.control.RateLimit(2000.0)], 1.0, 0.4, 5,

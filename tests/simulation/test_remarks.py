@@ -80,7 +80,7 @@ def test_extremes_are_those_of_all_steps(method: str) -> None:
     """A run that keeps every step shows them: least and largest of q and v over its samples, to the bit."""
     arm = rd.load("ur5")
     q0, v0 = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4]), np.array([0.5, 0.4, -0.3, 0.2, 0.6, -0.5])
-    plant, law = rd.Plant(arm, [rd.effects.ViscousFriction(2.0)]), rd.control.PD(rd.control.hold(q0), 50.0, 5.0)
+    plant, law = rd.Plant(arm, [rd.effects.ViscousFriction(2.0)]), rd.control.PD(rd.control.hold(q0), kp=50.0, kd=5.0)
     setup = rd.Setup(plant, q0, v0, 0.05, law, method, estimate_error=False)
     every, few = rd.simulate(setup), rd.simulate(setup, record_every_s=0.05)
     np.testing.assert_array_equal(every.extremes, few.extremes)
@@ -113,7 +113,7 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     """The limit L acts while kp (e − L t²/2M) − kd L t/M > L: the positive root of a quadratic, to a step of 1 ms."""
     kp, kd, e = 20.0, 10.0, 1.0
     a = LIMIT / INERTIA
-    control = rd.control.PD(rd.control.hold([e]), kp, kd)
+    control = rd.control.PD(rd.control.hold([e]), kp=kp, kd=kd)
     setup = rd.Setup(
         rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, method="RK4"
     )
@@ -128,7 +128,7 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
 def cart():
     """A cart pushed beyond 2 m, 5 m/s and 100 N, the limits of its file, with a sample at both ends only."""
     plan = rd.control.quintic(np.zeros(2), np.array([2.5, 0.0]), 0.8)
-    plant, law = rd.Plant(rd.load("cart_pole")), rd.control.PD(plan, 4e3, 400.0)
+    plant, law = rd.Plant(rd.load("cart_pole")), rd.control.PD(plan, kp=4e3, kd=400.0)
     return rd.Setup(plant, np.zeros(2), None, 1.0, law, "RK4", record_every_s=1.0, estimate_error=False)
 
 
@@ -287,7 +287,7 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         middle = np.sqrt(low * high)
         low, high = (middle, high) if radius(middle) < 1 else (low, middle)
     period = part * low
-    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0]), kp, kd, period), actuation_delay=1.0)
+    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd, period_s=period), actuation_delay=1.0)
     run = rd.simulate(
         joint, [1e-6], duration_s=1000 * period, controller=loop, method="RK4", step_s=period, engine=engine,
         estimate_error=False,
@@ -308,7 +308,7 @@ def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
     for bend, says in ((1e-3, True), (1.0, False)):
         q = np.array([0.4, bend])
         at = arm.placement(q, frame)[:3, 3]
-        law = rd.control.OperationalSpace(arm, frame, rd.control.line(at, at, 1.0), 50.0, 10.0, rows=(0, 2))
+        law = rd.control.OperationalSpace(arm, frame, rd.control.line(at, at, 1.0), kp=50.0, kd=10.0, rows=(0, 2))
         run = rd.simulate(arm, q, duration_s=0.3, controller=law, estimate_error=False, **steps)
         assert (RemarkKind.DAMPED in kinds(run)) == says
         if says:

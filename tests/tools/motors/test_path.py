@@ -153,7 +153,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.2 * arm.effort_limit / arm.velocity_limit)])
     found = rd.tools.motors.path(plant, WAY, share=0.95, velocity=0.98 * arm.velocity_limit)
     gains = [4000.0] * 3 + [800.0] * 3, [160.0] * 3 + [16.0] * 3
-    controller = rd.control.FeedForward(arm, found.reference, *gains)
+    controller = rd.control.FeedForward(arm, found.reference, kp=gains[0], kd=gains[1])
     run = rd.simulate(
         plant,
         WAY[0],
