@@ -21,7 +21,7 @@ from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare
-from robot_dyn.scene.messages import part
+from robot_dyn.scene.messages import named_by_key, part
 from robot_dyn.scene.references import Reference
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint, wrong_key
 
@@ -157,9 +157,10 @@ class Control(Part):
         if self.kind == "pid":
             limit = per_joint("effort_limit_N_m", self.effort_limit_N_m, robot, elsewhere=np.inf)
             limit = stated_efforts(robot) if limit is URDF else limit
-            return PID(
-                desired, kp=kp, ki=kp * self.integral_rate_per_s, kd=kd, effort_limit=limit, period_s=self.period_s
-            )
+            with named_by_key({"effort_limit": "effort_limit_N_m"}):
+                return PID(
+                    desired, kp=kp, ki=kp * self.integral_rate_per_s, kd=kd, effort_limit=limit, period_s=self.period_s
+                )
         if self.kind == "pd":
             return PD(desired, kp=kp, kd=kd, period_s=self.period_s)
         return KINDS[self.kind](model, desired, kp=kp, kd=kd, period_s=self.period_s)  # pyright: ignore[reportCallIssue]

@@ -20,6 +20,7 @@ from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
+from robot_dyn.scene.messages import named_by_key
 from robot_dyn.scene.schema import (
     Form,
     NotNegative,
@@ -67,7 +68,11 @@ class DeclaredEffect(Declared, Acting):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         effect = self.call(robot)
-        return effect if isinstance(effect, tuple) else effect.parts
+        effects = effect if isinstance(effect, tuple) else effect.parts
+        with named_by_key(self.key_by_name()):
+            for one in effects:
+                one.on(robot)  # reports wrong values here, where the keys of the file are known
+        return effects
 
 
 class Body(Part):
@@ -86,7 +91,8 @@ class Body(Part):
     @property
     def payload(self) -> Payload:
         """The body and its link."""
-        return Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
+        with named_by_key({"payload inertia": "inertia_kg_m2"}):
+            return Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
 
 
 class Gravity(Edit):
@@ -142,8 +148,9 @@ class Armature(Edit):
             if not stated:
                 return robot.with_(armature=URDF)
             return robot.with_(armature={name: stated.get(name, 0.0) for name in robot.joint_names})
-        inertia = per_joint("armature", self.inertia_kg_m2, robot)
-        return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
+        with named_by_key({"armature": "inertia_kg_m2"}):
+            inertia = per_joint("armature", self.inertia_kg_m2, robot)
+            return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
 
 
 class Carried(Acting, Body):

@@ -147,7 +147,7 @@ CONTROL = '[control]\nkind = "{}"\nbandwidth_rad_s = 10.0\n'
             SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]\nstart_s = 0.05\n',
             "no frame 'tipp'; nearest: tip",
         ),
-        (SCENE + '[[effect]]\nkind = "viscous_friction"\n', "viscous='urdf' has no effect"),
+        (SCENE + '[[effect]]\nkind = "viscous_friction"\n', 'viscous_N_m_s_per_rad = "urdf" has no effect'),
         (SCENE.replace("0.1", "true"), "duration_s: .*, got True"),
         (SCENE.replace("0.1", '"0.1"'), "duration_s: .*, got '0.1'"),
         (SCENE + "estimate_error = 0\n", "estimate_error: .*, got 0"),
