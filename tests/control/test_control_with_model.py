@@ -70,7 +70,7 @@ def test_computed_torque_tracks_from_a_wrong_start() -> None:
 
 
 def test_gains_of_computed_torque_follow_from_bandwidth_and_damping_ratio() -> None:
-    """kp = ω² and kd = 2 ζ ω, joint by joint; ζ is 1 by default. Copies with other gains keep the reference."""
+    """For each joint kp = ω² and kd = 2 ζ ω; ζ is 1 by default. Copies with other gains keep the reference."""
     robot, omega, zeta = rd.load("planar_2r"), np.array([7.0, 30.0]), np.array([0.6, 0.2])
     reference = hold([0.1, 0.2])
     law = ComputedTorque(robot, reference, bandwidth_rad_s=omega, damping_ratio=zeta, period_s=0.01)
