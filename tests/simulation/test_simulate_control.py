@@ -27,7 +27,7 @@ def controllers(period: float) -> list:
         rd.control.PID(GOAL, kp=kp, ki=40.0, kd=kd, effort_limit=[30.0, 12.0], period_s=period),
     ]
     laws += [
-        law(DOUBLE, GOAL, kp, kd, period_s=period)
+        law(DOUBLE, GOAL, kp=kp, kd=kd, period_s=period)
         for law in (rd.control.ComputedTorque, rd.control.PDGravity, rd.control.FeedForward)
     ]
     return laws
