@@ -139,8 +139,9 @@ class Control(Part):
             return controller
         lines: Any = {line: [block.call(robot) for block in getattr(self, line)] for line in LINES}
         return Loop(
-            controller, **lines, seed=self.noise_seed,
-            measurement_delay=self.measurement_delay_periods, actuation_delay=self.actuation_delay_periods,
+            controller, **lines, noise_seed=self.noise_seed,
+            measurement_delay_periods=self.measurement_delay_periods,
+            actuation_delay_periods=self.actuation_delay_periods,
         )  # fmt: skip
 
     def _controller(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:

@@ -29,6 +29,7 @@ from robot_dyn.scene.schema import (
     PerJoint,
     Positive,
     Stated,
+    Truth,
     Vector3,
     kinds_of,
     one_of,
@@ -161,12 +162,12 @@ class Carried(Acting, Body):
     """Time at which it is picked up; 0 if the arm starts with it."""
     end_s: Positive | None = None
     """Time at which it is dropped."""
-    picked_up: Literal["at_rest", "at_speed_of_link"] = "at_rest"
-    """Motion of the body before it is picked up: at rest, an impact that loses energy, or at the speed of the link."""
+    at_rest: Truth = True
+    """True if the body rests before it is picked up, an impact that loses energy; false if it moves with the link."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         end = inf if self.end_s is None else self.end_s
-        return (CarriedPayload(self.payload, self.start_s, end, self.picked_up == "at_rest"),)
+        return (CarriedPayload(self.payload, self.start_s, end, self.at_rest),)
 
 
 class Wrench(Acting):

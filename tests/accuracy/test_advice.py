@@ -144,7 +144,7 @@ def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, la
     law = rd.control.PD(
         rd.control.hold(q + arm.N(q) / gains[0]), kp=gains[0], kd=gains[1], period_s=1e-3
     )  # which holds the arm where it is
-    loop = rd.control.Loop(law, measurement_delay=late[0], actuation_delay=late[1])
+    loop = rd.control.Loop(law, measurement_delay_periods=late[0], actuation_delay_periods=late[1])
     found = linearised(rd.Plant(arm), loop, 0.0, np.concatenate([q, 0 * q])).longest_period()
     assert growth(arm, q, gains, 0.999 * found, late) <= 1 + 1e-6  # gravity's slope is by differences
     assert growth(arm, q, gains, 1.001 * found, late) > 1 + 1e-5
@@ -160,7 +160,7 @@ def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
         "position": rd.control.Quantisation(1e-4),
     }
     loop = rd.control.Loop(
-        both, **blocks, actuation=[rd.control.RateLimit(9.0), rd.control.Noise(0.1)], measurement_delay=1.0
+        both, **blocks, actuation=[rd.control.RateLimit(9.0), rd.control.Noise(0.1)], measurement_delay_periods=1.0
     )
     found = linearised(rd.Plant(BLOCK), loop, 0.0, np.zeros(2)).longest_period()
 

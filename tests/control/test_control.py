@@ -201,7 +201,7 @@ def test_a_sampled_law_is_defined_by_its_next_state_alone(engine: str, in_loop: 
     """Equal to the law by its rate, to rounding of z over 30 ticks."""
     arm, ends = rd.load("planar_2r"), []
     for law in (Averaging(), AveragingByRate()):
-        controller = rd.control.Loop(law, actuation_delay=0.5) if in_loop else law
+        controller = rd.control.Loop(law, actuation_delay_periods=0.5) if in_loop else law
         run = rd.simulate(arm, [0.1, 0.2], duration_s=0.3, controller=controller, engine=engine, estimate_error=False)
         ends.append(run.q[-1])
     np.testing.assert_allclose(*ends, rtol=1e-12)

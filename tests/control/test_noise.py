@@ -66,7 +66,7 @@ def test_noise_is_the_same_alone_in_batches_and_in_threads() -> None:
     loop = rd.control.Loop(
         rd.control.PD(rd.control.hold([0.0, 0.0]), kp=WEAK, kd=0.0, period_s=PERIOD),
         position=rd.control.Noise(1.0),
-        seed=SEED,
+        noise_seed=SEED,
     )
     given = {"duration_s": TICKS * PERIOD, "record_every_s": PERIOD}
     expected = [-WEAK * deviates(SEED, run, TICKS + 1, 2) for run in range(130)]
@@ -87,8 +87,8 @@ def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
     """A tick of several instants has one; a companion of other steps has the same, so that errors can be estimated."""
     loop = rd.control.Loop(
         rd.control.PD(rd.control.hold([0.0, 0.0]), kp=WEAK, kd=0.0, period_s=PERIOD), position=rd.control.Noise(1.0),
-        measurement_delay=0.3,
-        actuation_delay=1.5, seed=4,
+        measurement_delay_periods=0.3,
+        actuation_delay_periods=1.5, noise_seed=4,
     )  # fmt: skip
     run = rd.simulate(
         ARM, [0.0, 0.0], controller=loop, method="RK4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD

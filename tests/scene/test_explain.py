@@ -97,7 +97,7 @@ def test_plant_and_setup_show_their_equation() -> None:
     arm = rd.load("planar_2r")
     plant = rd.Plant(arm, [rd.effects.ViscousFriction([0.5, 0.2])])
     law = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=9.0, kd=6.0, period_s=0.01)
-    setup = rd.Setup(plant, [0.1, 0.2], duration_s=0.1, controller=rd.control.Loop(law, measurement_delay=1.0))
+    setup = rd.Setup(plant, [0.1, 0.2], duration_s=0.1, controller=rd.control.Loop(law, measurement_delay_periods=1.0))
     assert repr(plant).startswith("<Plant: planar_2r: 2 joints, joint_1, joint_2\n")
     assert repr(setup).startswith("<Setup: planar_2r: 2 joints, joint_1, joint_2\n")
     for value in (plant, setup):
@@ -106,4 +106,4 @@ def test_plant_and_setup_show_their_equation() -> None:
             assert line in repr(value) and line in page.text_content()
         assert "<script" not in value._repr_html_() and len(value._repr_html_()) < 5_000
     assert "u = kp (q_d − q) + kd (v_d − v)" in repr(setup) and "kp = 9 N m/rad" in repr(setup)
-    assert "measurement_delay = 1" in repr(setup)
+    assert "measurement_delay_periods = 1" in repr(setup)

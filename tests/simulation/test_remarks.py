@@ -287,7 +287,9 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         middle = np.sqrt(low * high)
         low, high = (middle, high) if radius(middle) < 1 else (low, middle)
     period = part * low
-    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd, period_s=period), actuation_delay=1.0)
+    loop = rd.control.Loop(
+        rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd, period_s=period), actuation_delay_periods=1.0
+    )
     run = rd.simulate(
         joint, [1e-6], duration_s=1000 * period, controller=loop, method="RK4", step_s=period, engine=engine,
         estimate_error=False,

@@ -33,7 +33,7 @@ STOPPED = rd.Plant(CART, [*DAMPED.effects, *rd.effects.joint_stops([-2.5, -4.0],
 HELD = rd.Plant(
     CART, [*DAMPED.effects, rd.effects.DryFriction([2.0, 0.01]), rd.effects.RigidStops([-2.5, -4.0], [1.2, 4.0])]
 )
-LATE = rd.control.Loop(rd.control.PD(GOAL, kp=500.0, kd=[60.0, 0.1], period_s=0.02), actuation_delay=1.0)
+LATE = rd.control.Loop(rd.control.PD(GOAL, kp=500.0, kd=[60.0, 0.1], period_s=0.02), actuation_delay_periods=1.0)
 SWEEP = np.linspace(0.2, 1.6, B)
 
 

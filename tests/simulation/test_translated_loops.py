@@ -34,7 +34,7 @@ PLAIN = [name for name in FIXED_STEP if method(name).plain]
 Q0, V0 = np.array([0.31, -0.73]), np.array([0.9, -1.7])
 SAMPLED = rd.control.Loop(
     rd.control.PD(rd.control.hold([0.4, -0.2]), kp=[9.0, 5.0], kd=[0.7, 0.4], period_s=0.03),
-    actuation=rd.control.Noise(0.2), actuation_delay=0.5
+    actuation=rd.control.Noise(0.2), actuation_delay_periods=0.5
 )  # fmt: skip
 CONTINUOUS = rd.control.PD(rd.control.hold([0.4, -0.2]), kp=[9.0, 5.0], kd=[0.7, 0.4])
 SMOOTH = [rd.effects.ViscousFriction([0.3, 0.2]), rd.effects.RegularisedCoulombFriction([0.2, 0.1], 0.05)]

@@ -92,9 +92,9 @@ def _controller(
         law = rd.control.PD(plan, kp=kp, kd=kd, period_s=float(rng.choice([0.005, 0.01, 0.02])))
         measured, acts = float(rng.choice([0.0, 0.4, 1.2])), float(rng.choice([0.0, 0.5, 1.0]))
         return rd.control.Loop(
-            law, position=rd.control.Noise(1e-4), velocity=rd.control.LowPass(30.0), measurement_delay=measured,
-            actuation_delay=acts,
-            seed=int(rng.integers(99)),
+            law, position=rd.control.Noise(1e-4), velocity=rd.control.LowPass(30.0), measurement_delay_periods=measured,
+            actuation_delay_periods=acts,
+            noise_seed=int(rng.integers(99)),
         )  # fmt: skip
     if family == "effort limit" and rng.random() < 0.5:
         return rd.control.PID(plan, kp=kp, ki=2 * kp, kd=kd, effort_limit=scale * rng.uniform(2, 20, arm.n))

@@ -48,7 +48,11 @@ def controller(arm: rd.Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray
             rd.control.hold(q), kp=gains[0], ki=3 * gains[0], kd=gains[1], effort_limit=limit, period_s=1e-3
         )
     law = rd.control.PD(rd.control.hold(q + arm.N(q) / gains[0]), kp=gains[0], kd=gains[1], period_s=1e-3)
-    return rd.control.Loop(law, measurement_delay=LATE[kind][0], actuation_delay=LATE[kind][1]) if kind != "PD" else law
+    return (
+        rd.control.Loop(law, measurement_delay_periods=LATE[kind][0], actuation_delay_periods=LATE[kind][1])
+        if kind != "PD"
+        else law
+    )
 
 
 def run_at(arm: rd.Robot, q: np.ndarray, law: rd.control.Controller, period: float) -> tuple[rd.Trajectory, float]:

@@ -104,7 +104,7 @@ def test_rollouts_numbered_otherwise_are_those_runs() -> None:
     arm = rd.load("planar_2r")
     hold = rd.control.quintic([0.1, 0.2], [0.3, 0.1], 0.05)
     loop = rd.control.Loop(
-        rd.control.PD(hold, kp=40.0, kd=4.0, period_s=0.005), position=rd.control.Noise(0.01), seed=1
+        rd.control.PD(hold, kp=40.0, kd=4.0, period_s=0.005), position=rd.control.Noise(0.01), noise_seed=1
     )
     setup = rd.Setup(rd.Plant(arm), [0.1, 0.2], duration_s=0.05, controller=loop, method="RK4")
     whole = rd.rollouts(setup, np.tile([0.1, 0.2], (8, 1)))
