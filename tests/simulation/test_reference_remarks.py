@@ -29,7 +29,7 @@ def test_way_points_as_samples_jump_in_velocity() -> None:
     """Through five points goes one polynomial of degree 4, whose slope at the start is known."""
     slope = np.array([np.polyder(np.polyfit(TIMES, column, 4))[-1] for column in POINTS.T])
     remarks = found(RemarkKind.JUMPS, rd.control.Samples(TIMES, POINTS))
-    assert [(each.joint, each.quantity, each.at, each.limit) for each in remarks] == [("joint_1", "v", 0.0, 0.0)]
+    assert [(each.joint, each.quantity, each.at_s, each.limit) for each in remarks] == [("joint_1", "v", 0.0, 0.0)]
     assert remarks[0].value == pytest.approx(slope[0], rel=1e-9) and abs(slope[0]) > 2.5
     assert "joint_1 from 0 to 2.9" in remarks[0].text and "rd.control.via_points" in remarks[0].remedy
 
@@ -57,7 +57,7 @@ def test_a_reference_that_begins_otherwise_than_the_joint_is_remarked(reference,
     said = found(RemarkKind.JUMPS, reference, v0)
     assert [(each.joint, each.quantity) for each in said] == [each[:2] for each in jumps]
     for each, expected in zip(said, jumps, strict=True):
-        assert (each.at, each.value, each.limit) == pytest.approx(expected[2:], abs=1e-12)
+        assert (each.at_s, each.value, each.limit) == pytest.approx(expected[2:], abs=1e-12)
 
 
 @pytest.mark.parametrize(("stiffness", "holds"), [(9.0, True), (11.0, False)])

@@ -53,8 +53,8 @@ def test_sampled_damping_chatters_above_two(joint, ratio: float, integrator, cha
     if chatters:
         (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.CHATTER)
         # from ~1 % of the limit to it, amplitudes grow by 1.2 a tick: some 25 ticks
-        assert said.start < 0.05
-        assert said.start + said.duration == pytest.approx(0.5 - PERIOD, abs=2 * PERIOD)
+        assert said.start_s < 0.05
+        assert said.start_s + said.duration_s == pytest.approx(0.5 - PERIOD, abs=2 * PERIOD)
         assert said.value == pytest.approx(LIMIT, rel=1e-12)
         assert "kd period_s / M is 2.2" in said.remedy
         np.testing.assert_array_equal(run.extremes[2, :, 0], [-LIMIT, LIMIT])
@@ -105,8 +105,8 @@ def test_machine_code_shows_what_the_interpreted_loop_shows(joint, monkeypatch) 
     monkeypatch.undo()
     many = rd.simulate(damped(joint, 2.2, duration_s=1.5), engine="interpreted")
     assert kinds(few) == kinds(many)
-    assert few.remarks[0].duration == pytest.approx(many.remarks[0].duration)
-    assert few.remarks[0].start == many.remarks[0].start
+    assert few.remarks[0].duration_s == pytest.approx(many.remarks[0].duration_s)
+    assert few.remarks[0].start_s == many.remarks[0].start_s
 
 
 def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
@@ -120,8 +120,8 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     run = rd.simulate(setup, record_every_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
     (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.EFFORT_REACHED)
-    assert (said.start, said.value) == (0.0, LIMIT)
-    assert said.duration == pytest.approx(root, abs=1.5e-3)
+    assert (said.start_s, said.value) == (0.0, LIMIT)
+    assert said.duration_s == pytest.approx(root, abs=1.5e-3)
 
 
 @pytest.fixture(scope="module")
@@ -141,9 +141,9 @@ def test_what_passes_the_limits_of_the_file_is_said(cart) -> None:
         remark, size = said[quantity], np.abs(x[:, 0])
         slack = 0.01 * size.max() if quantity == "u" else 0.0  # its value is that of the last stage
         assert abs(remark.value) == pytest.approx(size.max(), abs=slack)
-        assert remark.at == pytest.approx(every.t[size.argmax()], abs=2e-3)
-        assert remark.start == pytest.approx(every.t[np.flatnonzero(size > limit)[0]], abs=2e-3)
-        assert remark.duration == pytest.approx(np.sum(size > limit) * 1e-3, abs=5e-3)
+        assert remark.at_s == pytest.approx(every.t[size.argmax()], abs=2e-3)
+        assert remark.start_s == pytest.approx(every.t[np.flatnonzero(size > limit)[0]], abs=2e-3)
+        assert remark.duration_s == pytest.approx(np.sum(size > limit) * 1e-3, abs=5e-3)
         assert (remark.joint, abs(remark.limit)) == ("slide", limit)
 
 
@@ -161,7 +161,7 @@ def test_a_start_beyond_a_limit_is_said(cart) -> None:
     """From 0 s, though the first step leaves it at once."""
     run = rd.simulate(cart, q0=[2.0 + 1e-6, 0.0], v0=[-1.0, 0.0], controller=None, duration_s=0.1)
     (said,) = run.remarks
-    assert (said.kind, said.start, said.value, said.limit) == (RemarkKind.BEYOND, 0.0, 2.0 + 1e-6, 2.0)
+    assert (said.kind, said.start_s, said.value, said.limit) == (RemarkKind.BEYOND, 0.0, 2.0 + 1e-6, 2.0)
 
 
 def test_an_adaptive_run_is_watched_at_its_steps() -> None:
@@ -317,7 +317,7 @@ def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
             (said,) = (each for each in run.remarks if each.kind is RemarkKind.DAMPED)
             J = arm.jacobian(q, frame)[[0, 2]]
             assert said.value == pytest.approx(np.linalg.eigvalsh(J @ np.linalg.inv(arm.M(q)) @ J.T)[0], rel=1e-6)
-            assert said.duration == pytest.approx(0.3)
+            assert said.duration_s == pytest.approx(0.3)
             assert "task damped near a singularity: tip for 0.3 s from 0 s" in run.summary
 
 

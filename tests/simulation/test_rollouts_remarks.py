@@ -99,7 +99,7 @@ def test_each_run_has_the_remarks_of_simulate(batch) -> None:
         ours = told(runs[i])
         assert ours.keys() == theirs.keys()
         for about, remark in theirs.items():
-            numbers = [[x.start, x.duration, x.at, x.value, x.limit or 0.0] for x in (ours[about], remark)]
+            numbers = [[x.start_s, x.duration_s, x.at_s, x.value, x.limit or 0.0] for x in (ours[about], remark)]
             if by_instants(runs, about):
                 np.testing.assert_allclose(*np.array(numbers)[:, :3], rtol=0, atol=2 * SPACING)
                 np.testing.assert_allclose(*np.array(numbers)[:, 3:], rtol=5e-3)
@@ -120,7 +120,7 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         assert {about for about, remark in told(runs).items() if i in remark.runs} == theirs.keys()
     for about, remark in told(runs).items():
         of = [told(alone[i])[about] for i in remark.runs]
-        size = [x.duration if x.kind is RemarkKind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
+        size = [x.duration_s if x.kind is RemarkKind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
         seen = by_instants(runs, about)
         assert size[0] >= max(size) * (1 - (5e-3 if seen else 1e-9))
         assert remark.text.endswith(" (at samples and 200 instants)") if seen else remark.text == of[0].text
@@ -246,7 +246,7 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     runs = rd.rollouts(replace(given, method=rd.integrate.method("RK4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
         (at,) = (each for each in remarks if each.kind is RemarkKind.EFFORT_REACHED and each.joint == "slide")
-        assert at.duration == pytest.approx(0.2, rel=1e-9)
+        assert at.duration_s == pytest.approx(0.2, rel=1e-9)
 
 
 def test_growth_over_a_run_counts_its_periods() -> None:
