@@ -2,7 +2,7 @@
 
 An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q)`, …
 Other formulations  Lagrangian, compiled, euler_lagrange
-What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
+What it answers     info (an arm), why (a torque by cause), explain (what is integrated), parameters (that can vary)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
 To look at          replay, show, plot, save_replay, save_plot, diff_runs

@@ -31,9 +31,9 @@ from robot_dyn.simulation.results.run_file import save_run as save_run
 from robot_dyn.simulation.results.trajectory import Trajectory as Trajectory
 from robot_dyn.simulation.rollouts.file import load_rollouts as load_rollouts
 from robot_dyn.simulation.rollouts.file import save_rollouts as save_rollouts
+from robot_dyn.simulation.rollouts.parameters import parameters as parameters
 from robot_dyn.simulation.rollouts.result import Rollouts as Rollouts
 from robot_dyn.simulation.rollouts.rollouts import rollouts as rollouts
-from robot_dyn.simulation.rollouts.sweepable import sweepable as sweepable
 from robot_dyn.simulation.setup.setup import Setup as Setup
 from robot_dyn.simulation.simulate import simulate as simulate
 from robot_dyn.view.plots.plots import plot as plot

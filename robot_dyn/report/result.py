@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
@@ -42,7 +42,7 @@ class Result(Answer):
         raise NotImplementedError
 
     @property
-    def rows(self) -> Iterable[Mapping[str, Any]]:
+    def rows(self) -> Iterable[Mapping[str, object]]:
         """Rows of the table, values by column."""
         return ()
 

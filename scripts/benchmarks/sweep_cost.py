@@ -133,7 +133,7 @@ def samples(given: argparse.Namespace) -> None:
 def rollouts_of(setup: rd.Setup, values: dict[str, np.ndarray], work: Work) -> None:
     """What a user would call for the runs of a chunk."""
     params = {name: x for name, x in values.items() if name != "q0"}
-    rd.rollouts(setup, values.get("q0"), params=params, record=work.record, threads=1)
+    rd.rollouts(setup, values.get("q0"), vary=params, record=work.record, threads=1)
 
 
 def overhead(given: argparse.Namespace) -> None:

@@ -159,7 +159,7 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
 
 
 def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
-    monkeypatch.setattr("robot_dyn.accuracy.costs.query_cost._MOST_TIMED", 30)
+    monkeypatch.setattr("robot_dyn.accuracy.costs.query_cost._MAX_TIMED", 30)
     found = rd.accuracy.cost(setup(), budget_s=20.0, repeats=1)
     row = found.of("forward dynamics")
     assert row.first.instructions > 30 and not row.first.times

@@ -190,7 +190,7 @@ def test_the_common_part_of_runs_of_different_length_is_compared_and_said() -> N
     a, b = coasting(loaded(1.0)), coasting(loaded(1.0), duration_s=0.8)
     found = rd.diff_runs(a, b)
     assert found.end == DURATION and found.parted is None
-    assert found.left_out == ("0.5 to 0.8 s, which only run 2 has",)
+    assert found.left_out == ("0.5 to 0.8 s, covered by run 2 only",)
 
 
 @pytest.mark.parametrize("changes", ["damping", "gain", "reference", "period", "model", "start", "gravity"])

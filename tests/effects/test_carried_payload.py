@@ -141,7 +141,7 @@ def test_a_joint_that_sticks_slides_when_the_impact_reaches_it() -> None:
 def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
     plant, options = rd.Plant(ARM, [rd.effects.CarriedPayload(BODY, 0.1, 0.2)]), {"record_every_s": 0.05}
     setup = rd.Setup(plant, Q, V, 0.3, None, "DOP853", **options, estimate_error=False)
-    runs = rd.rollouts(setup, params={"gravity": [[0, 0, -G], [0, 0, -1.6]]}, record=("q", "work"))
+    runs = rd.rollouts(setup, vary={"gravity": [[0, 0, -G], [0, 0, -1.6]]}, record=("q", "work"))
     moon = replace(setup, plant=rd.Plant(ARM.with_(gravity=(0, 0, -1.6)), setup.plant.effects))
     for k, each in enumerate((setup, moon)):
         alone = rd.simulate(each)

@@ -165,7 +165,7 @@ def test_what_follows_from_a_coefficient_is_not_kept_where_that_is_swept() -> No
     """A cached property stayed what it was for the first run of a batch, and for other values of machine code."""
     setup = setup_of(Cached(1.0))
     rd.simulate(setup, engine="interpreted")  # which keeps c² = 1
-    runs = rd.rollouts(setup, params={"cached.c": [1.0, 3.0]})
+    runs = rd.rollouts(setup, vary={"cached.c": [1.0, 3.0]})
     for k, c in enumerate((1.0, 3.0)):
         np.testing.assert_allclose(runs.q[k], run(Cached(c), "interpreted").q, rtol=0, atol=1e-12)
 
@@ -789,7 +789,7 @@ def test_the_example_of_a_controller_can_be_swept_and_is_compiled() -> None:
     names: dict[str, Any] = {"rd": rd, "dataclass": dataclass, "field": field}
     exec(dedent(text[text.index("        @dataclass") :]), names)
     setup = rd.Setup(rd.Plant(ARM), Q, duration_s=0.1, controller=names["Damped"](ARM, 3.0), engine="compiled")
-    assert "damping" in repr(rd.sweepable(setup))
+    assert "damping" in repr(rd.parameters(setup))
     run = rd.simulate(setup)
     assert run.statistics.engine == "compiled"
     assert np.abs(run.q[-1] - Q).max() < 1e-12

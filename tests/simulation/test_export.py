@@ -45,7 +45,7 @@ def hostile(tame) -> rd.Trajectory:
 def batch() -> rd.Rollouts:
     setup = rd.Setup(rd.Plant(rd.load("cart_pole")), [0.1, 0.3], [0.2, -0.4], 0.05, method="RK4")
     swept = {"gravity": [[0.0, 0.0, -9.81], [0.1, 1 / 3, -1.6]]}
-    return replace(rd.rollouts(setup, params=swept, record=("q", "v", "energy")), joint_names=NAMES)
+    return replace(rd.rollouts(setup, vary=swept, record=("q", "v", "energy")), joint_names=NAMES)
 
 
 @pytest.fixture(params=["tame", "hostile"])

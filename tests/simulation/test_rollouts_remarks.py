@@ -73,7 +73,7 @@ def batch(request) -> tuple[rd.Rollouts, list]:
     """A batch, and each of its runs by itself."""
     given, params = SCENES[request.param]
     q0 = Q + 0.2 * np.random.default_rng(4).normal(size=(B, 2))
-    runs = rd.rollouts(given, q0, params=params)
+    runs = rd.rollouts(given, q0, vary=params)
     return runs, [rd.simulate(runs.setup_of(i), estimate_error=False, engine="compiled") for i in range(B)]
 
 
@@ -196,7 +196,7 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
 def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
     """The remark that `simulate` makes on that run, told of it alone."""
     given, params = SCENES["chattering"]
-    runs = rd.rollouts(given, params=params)
+    runs = rd.rollouts(given, vary=params)
     remark, theirs = (
         next(each for each in of.remarks if each.kind is RemarkKind.UNSTABLE)
         for of in (runs, rd.simulate(runs.setup_of(runs.worst), estimate_error=False, engine="compiled"))
@@ -226,7 +226,7 @@ def test_tracking_errors_of_a_frame() -> None:
 def test_a_batch_of_one_speaks_of_a_run() -> None:
     """Its lines are those of the run: there is no other to count, nor one that was not looked at."""
     given, params = SCENES["chattering"]
-    runs = rd.rollouts(given, params={name: x[:1] for name, x in params.items()})
+    runs = rd.rollouts(given, vary={name: x[:1] for name, x in params.items()})
     alone = rd.simulate(runs.setup_of(0), estimate_error=False, engine="compiled")
     assert runs.summary.startswith("1 run of 9 samples to t = 0.8 s; 0 diverged, 0 stopped\n")
     theirs = remark_lines(each for each in alone.remarks if each.kind in (*COUNTED, RemarkKind.UNSTABLE))

@@ -27,7 +27,7 @@ def batch(fast: float) -> rd.Rollouts:
     q0 = Q + 0.3 * np.random.default_rng(3).normal(size=(COUNT, 2))
     v0 = np.full((COUNT, 2), 0.3)
     v0[LOST] = [0.01 * fast, fast] if fast else 0.3
-    return rd.rollouts(setup, q0, v0, params={"kp": np.linspace(20.0, 80.0, COUNT)})
+    return rd.rollouts(setup, q0, v0, vary={"kp": np.linspace(20.0, 80.0, COUNT)})
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> Non
     (axes,) = plot(some_lost, "scatter").axes
     assert axes.get_title(loc="left") == "37 runs; 3 of 40 diverged"
     (crosses,) = lines(axes, "diverged (3)")
-    np.testing.assert_array_equal(crosses.get_xdata(), some_lost.params["kp"][LOST, 0])
+    np.testing.assert_array_equal(crosses.get_xdata(), some_lost.varied["kp"][LOST, 0])
 
 
 def test_a_batch_of_which_all_diverged_is_drawn(some_lost, tmp_path) -> None:
@@ -108,7 +108,7 @@ def test_columns_are_those_of_the_table_with_their_units(runs) -> None:
     (axes,) = plot(runs, "scatter").axes
     assert axes.get_xlabel() == "kp joint_1 [N m/rad]" and axes.get_ylabel().startswith("rms tracking error [")
     np.testing.assert_array_equal(
-        axes.lines[0].get_xydata(), np.column_stack([runs.params["kp"][:, 0], runs.rms_tracking_error])
+        axes.lines[0].get_xydata(), np.column_stack([runs.varied["kp"][:, 0], runs.rms_tracking_error])
     )
     (axes,) = plot(runs, "scatter", x="start q joint_2", y="largest v joint_1 [rad/s]").axes
     expected = np.column_stack([runs.q0[:, 1], table["largest v joint_1 [rad/s]"]])

@@ -1,4 +1,4 @@
-"""Commands on scenes: simulate, explain, sweepable, scene."""
+"""Commands on scenes: simulate, explain, parameters, scene."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ def explain(scene: Scene, /, as_json: Json = False) -> None:
 
 
 @command(ASK)
-def sweepable(scene: Scene, /, as_json: Json = False) -> None:
-    """List the parameters that runs of a scene can sweep."""
-    show(rd.sweepable(rd.read_scene(scene)), as_json=as_json)
+def parameters(scene: Scene, /, as_json: Json = False) -> None:
+    """List the parameters of a scene that can vary from run to run."""
+    show(rd.parameters(rd.read_scene(scene)), as_json=as_json)
 
 
 @command(FILES)

@@ -114,7 +114,7 @@ class Trajectory(TrajectoryData):
         joints, types = self.joint_names[:MOST_JOINTS], joint_types(self)
         quantities = {"q": "q", "v": "v"} | ({"u": "tau"} if np.any(self.u) else {})
         plots = [
-            plot(f"{name} [{joint_units(of, types)}]", self.t, dict(zip(joints, getattr(self, name).T, strict=False)))
-            for name, of in quantities.items()
+            plot(f"{name} [{joint_units(like, types)}]", self.t, dict(zip(joints, getattr(self, name).T, strict=False)))
+            for name, like in quantities.items()
         ]
         return curves("Trajectory", self.summary, joints, plots, len(self.joint_names) - len(joints))

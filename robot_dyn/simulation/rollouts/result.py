@@ -49,8 +49,8 @@ class Rollouts(RolloutsData):
         evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
         statistics: Statistics of the longest run; the time is for all runs.
         sources: Names of the sources of work: the control and the effects without a potential.
-        about: Texts common to all runs, as in `Trajectory`, without `params`.
-        params: Values that differ from run to run, by name, (B, n).
+        about: Texts common to all runs, as in `Trajectory`, without `varied`.
+        varied: Values that differ from run to run, by name, (B, n).
         setup: Setup shared by all runs; None for runs read from a file.
         uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
         q0, v0: Initial positions and velocities, (B, n).

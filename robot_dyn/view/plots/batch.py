@@ -141,7 +141,7 @@ def scatter(view: BatchView) -> list[Panel]:
     """
     runs = view.runs
     varied = [name for name, x in runs.table().items() if name != "run" and _numeric(x) and np.ptp(x) > 0]
-    if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.params, "start "))]):
+    if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.varied, "start "))]):
         raise PlotError("scatter: no parameter and no start differs from run to run; name a column by x=")
     x, at = _column(runs, "x", view.x or varied[0], ())
     y, values = _column(runs, "y", view.y, ("rms tracking error", "largest", "ended"))

@@ -24,7 +24,7 @@ LINES = (
     "compare pendulum planar_2r --samples 1 --seed 3",
     "simulate scene.toml -o out.npz --csv out.csv --force --json",
     "explain scene.toml",
-    "sweepable scene.toml --json",
+    "parameters scene.toml --json",
     "scene pendulum",
     "plot run.npz -o out.svg --only energy --joint slide --width-mm 120 --dark --force",
     "replay run.npz --html out.html --force --frame pole",

@@ -62,7 +62,7 @@ def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
     )
     done = sw.run(plan, tmp_path / "a", chunk=20)
     rows = done.table("mass_scale", "remarks")
-    runs = rd.rollouts(plan.setup, params={"mass_scale": rows["mass_scale"]})
+    runs = rd.rollouts(plan.setup, vary={"mass_scale": rows["mass_scale"]})
     assert rows["remarks"].tolist() == runs.table()["remarks"].tolist()
     assert sw.run(plan, tmp_path / "b", chunk=7).table("remarks")["remarks"].tolist() == rows["remarks"].tolist()
     for text, count in (done.remarks or {}).items():
@@ -237,7 +237,7 @@ def last(run):
 last.record = ("q",)
 
 def fails_sometimes(run):
-    if run.params["q0"][0] > 0.45:
+    if run.varied["q0"][0] > 0.45:
         raise ValueError("beyond the table")
     return run.t[-1]
 
