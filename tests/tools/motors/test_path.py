@@ -248,7 +248,8 @@ def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
     assert f"{found.duration_s:.6g} s" in text
     assert "shoulder_pan_joint" in text
     assert found.phases[0].start_s == pytest.approx(0.0, abs=0.01 * found.duration_s)
-    assert all(first.end_s <= second.start_s + 1e-12 for first, second in zip(found.phases, found.phases[1:], strict=False))
+    pairs = zip(found.phases, found.phases[1:], strict=False)
+    assert all(first.end_s <= second.start_s + 1e-12 for first, second in pairs)
     assert "<svg" in found.drawing
     assert '"at_limits"' in found.to_json()
 
