@@ -105,8 +105,8 @@ def test_computed_torque_takes_either_gains_or_bandwidth(gains: dict[str, Any]) 
 def test_gains_are_passed_by_keyword() -> None:
     """Their order and units differ between laws."""
     robot, reference = rd.load("planar_2r"), hold([0.1, 0.2])
-    of_model: list[Any] = [partial(law, robot) for law in (PDGravity, FeedForward, ComputedTorque)]
-    for law in (PD, PID, *of_model):
+    laws: list[Any] = [PD, PID, *(partial(law, robot) for law in (PDGravity, FeedForward, ComputedTorque))]
+    for law in laws:
         with pytest.raises(TypeError, match="positional"):
             law(reference, 1.0, 1.0, 1.0)
 
