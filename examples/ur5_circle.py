@@ -34,7 +34,7 @@ for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mas
         rd.Plant(arm),
         q0=q_start,
         v0=np.zeros(arm.n),
-        duration_s=circle.position.end,
+        duration_s=circle.position.end_s,
         controller=rd.control.OperationalSpace(model, frame, circle, kp=kp, kd=kd),
         rtol=1e-8,
         atol=1e-10,

@@ -25,11 +25,11 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 40,
-    "as of": 14,
-    "what without noun": 57,
+    "opening": 33,
+    "as of": 10,
+    "what without noun": 56,
     "is told": 1,
-    "says that": 11,
+    "says that": 10,
     "tells that": 1,
     "goes on": 0,
     "looks": 6,
@@ -40,15 +40,15 @@ CEILINGS = {
     "beside": 9,
     "anew": 0,
     "likewise": 0,
-    "in place of": 5,
+    "in place of": 2,
     "so many": 0,
     "but for": 0,
     "whatever": 2,
-    "of which": 9,
+    "of which": 8,
     "the same holds": 0,
     "each": 53,
     "arguments": 0,
-    "Any": 635,
+    "Any": 563,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -23,6 +23,7 @@ from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError, RobotDynError, escaped
 from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units
@@ -215,13 +216,16 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
     n, chosen = plant.dynamics.n, setup.method
-    methods = {name: method(name) for name in FIXED_STEP} | ({} if chosen.controls_error else {chosen.name: chosen})
+    methods = {name: method(name) for name in FIXED_STEP}
+    step, own_rates = 0.0, []
+    if isinstance(chosen, Integrator):
+        methods |= {chosen.name: chosen}
+        step, own_rates = setup.taken_step_s, [excess_rate(chosen, J, n) for J in matrices]
     limits = {name: min(longest_step(candidate, J, n) for J in matrices) for name, candidate in methods.items()}
-    step = 0.0 if chosen.controls_error else setup.taken_step_s
     law = controller if period else None
     loops = [] if law is None else [linearised(plant, law, t, _without_works(loop, y)) for t, y in states]
     factors = [after(sampled.factor(period), periods(duration, period)) for sampled in loops]
-    factors += [exp(min(max(0.0, excess_rate(chosen, J, n)(step)) * duration, LARGEST)) for J in matrices if step]
+    factors += [exp(min(max(0.0, rate(step)) * duration, LARGEST)) for rate in own_rates]
     return Advice(
         method=chosen.name,
         step_s=step,

@@ -152,7 +152,7 @@ def diff_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERA
         QueryError: If the runs are of different robots, or have no time in common.
     """
     for name, run in (("a", a), ("b", b)):
-        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.load_run, or a run of rollouts")
+        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.read, or a run of rollouts")
     tolerance = number("tolerance", tolerance, above=0, error=QueryError)
     differences, types = difference(a, b, tolerance), joint_types(a)
     unit_of_q, (first, second) = joint_units("q", types), run_names(a, b)

@@ -44,7 +44,7 @@ def made(self, *given):
     first.append(time.perf_counter() - began)
     return plain(self, *given)
 Work.made = made
-done = sw.read({out!r})
+done = sw.read_sweep({out!r})
 sw.run(done.sweep, {out!r}, threads=2)
 print(f"{{done.folder.count}} chunks: the work begins {{first[0]:.2f}} s after the import of the room;"
       f" with its last chunk {{time.perf_counter() - began:.2f}} s, CPU {{time.process_time() - cpu:.2f}} s")

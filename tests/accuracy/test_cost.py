@@ -249,7 +249,7 @@ def test_json_and_rows_hold_the_alternatives() -> None:
 
 def test_a_time_that_was_not_measured_is_an_empty_cell(tmp_path) -> None:
     result = rd.accuracy.cost(setup(FRICTION), **TINY)
-    with rd.accuracy.save_result(result, tmp_path / "cost.csv").open(newline="", encoding="utf-8") as file:
+    with result.save(tmp_path / "cost.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert rows and all(row["first_time_s"] == row["second_time_s"] == "" for row in rows)
 

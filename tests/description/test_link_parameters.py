@@ -97,7 +97,7 @@ def test_two_parameters_of_one_size_are_not_taken_for_each_other() -> None:
 
 def test_other_masses_are_kept_in_run_files(tmp_path) -> None:
     run = rd.simulate(setup(TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})))
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     assert run.acting is not None and f"mass 2.7 kg of {LINK}" in run.acting
     expected = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})
     np.testing.assert_array_equal(robot_of(again).M(STATES[0]), expected.M(STATES[0]))

@@ -148,10 +148,10 @@ def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
         np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-9)
         np.testing.assert_allclose(runs.work["pick_up"][k], alone.ledger.work["pick_up"], atol=1e-9)
     run = rd.simulate(setup)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     assert [each.name for each in again.events] == [each.name for each in run.events]
     np.testing.assert_array_equal(again.ledger.residual, run.ledger.residual)
-    rd.save_replay(again, tmp_path / "page")
+    rd.replay(again).save(tmp_path / "page")
 
 
 def test_a_plant_is_asked_at_a_time() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import Trajectory, export
+from robot_dyn import Trajectory
 from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError, tanh
@@ -366,7 +366,7 @@ def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within
     compiled, auto = rd.simulate(setup, engine="compiled"), rd.simulate(setup)
     assert auto.statistics.engine == compiled.statistics.engine
     assert f", {auto.statistics.engine}\n" in auto.summary
-    assert rd.load_run(rd.save_run(auto, tmp_path / "run")).statistics.engine == auto.statistics.engine
+    assert rd.read(auto.save(tmp_path / "run")).statistics.engine == auto.statistics.engine
     assert np.array_equal(auto.q, compiled.q)
     assert interpreted.error is not None and auto.error is not None
     within = interpreted.error.largest + auto.error.largest
@@ -669,9 +669,9 @@ def test_recorded_controller_states_obey_their_equation(
     else:  # the trapezoid rule: T h² e'' ki / 12 with |e''| < 50 rad/s²
         steps = np.diff(run.t)[:, None] * (e[1:] + e[:-1]) / 2 * ki
         np.testing.assert_allclose(z[1:], np.cumsum(steps, axis=0), rtol=0, atol=0.2 * 1e-6 * 50 * ki / 12)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     assert np.array_equal(again.controller_states, z)  # pyright: ignore[reportArgumentType]
-    rows = export(again, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    rows = again.save(tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].endswith("controller state 1,controller state 2")
     assert [float(x) for x in rows[-1].split(",")[-2:]] == z[-1].tolist()
 
@@ -679,7 +679,7 @@ def test_recorded_controller_states_obey_their_equation(
 def test_without_controller_states_nothing_is_recorded_of_them(tmp_path) -> None:
     run = rd.simulate(rd.Plant(ARM), q0=Q, duration_s=0.01, controller=ramp)
     assert run.controller_states is None
-    assert rd.load_run(rd.save_run(run, tmp_path / "run")).controller_states is None
+    assert rd.read(run.save(tmp_path / "run")).controller_states is None
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)

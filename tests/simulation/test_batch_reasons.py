@@ -68,5 +68,5 @@ def test_the_reason_of_a_run_does_not_depend_on_its_neighbours(tmp_path) -> None
     runs, alone = rd.rollouts(setup, vary={"kd": kd}), rd.rollouts(setup, vary={"kd": kd[:1]})
     assert set(map(str, runs.outcomes)) == {str(alone.outcome(0))}
     assert alone.outcome(0).reason is Reason.CONTROL_LOOP_UNSTABLE
-    back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs"))
+    back = rd.read(runs.save(tmp_path / "runs"))
     assert back.outcomes == runs.outcomes

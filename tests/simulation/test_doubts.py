@@ -39,7 +39,7 @@ def test_a_doubt_states_the_finer_setting_as_a_number(coarse: rd.Trajectory) -> 
 
 
 def test_doubts_are_the_same_in_a_file_and_in_json(coarse: rd.Trajectory, tmp_path: Path) -> None:
-    again = rd.load_run(rd.save_run(coarse, tmp_path / "run.npz"))
+    again = rd.read(coarse.save(tmp_path / "run.npz"))
     assert coarse.error is not None and again.error is not None
     assert (again.error.ends_early, again.ledger.cause) == (coarse.error.ends_early, coarse.ledger.cause)
     document = report.run(coarse)

@@ -285,17 +285,24 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
             np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
 
 
-@pytest.mark.parametrize("command", [("replay", "--html", "page.html"), ("plot",)], ids=lambda command: command[0])
+@pytest.mark.parametrize(
+    "command", [("replay", "--html", "page.html"), ("diff", "run.npz")], ids=lambda command: command[0]
+)
 def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
-    """Not that it is damaged; what they advise makes a file that they take."""
+    """A batch is not reported as damaged; the advised remedy makes a file that they accept."""
     monkeypatch.chdir(tmp_path)
-    rd.save_rollouts(rd.rollouts(SETUP, starts(3), V), "runs.npz")
+    rd.rollouts(SETUP, starts(3), V).save("runs.npz")
     text = refusal((command[0], "runs.npz", *command[1:]))
-    assert "is a file of rollouts" in text and "simulate again" not in text
-    rd.save_run(rd.load_rollouts("runs.npz")[0], "run.npz")
-    assert "written: " in said(command[0], "run.npz", *command[1:])
-    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts: rd.load_run reads it"):
-        rd.load_rollouts("run.npz")
+    assert "is a batch of 3 runs" in text and "[0].save(" in text
+    rd.read("runs.npz")[0].save("run.npz")
+    assert said(command[0], "run.npz", *command[1:])
+
+
+def test_the_command_plot_draws_a_batch(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rd.rollouts(SETUP, starts(3), V).save("runs.npz")
+    assert "written: " in said("plot", "runs.npz", "--only", "fan", "--joint", "joint_1")
+    assert (tmp_path / "runs.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("u",)])
@@ -304,34 +311,28 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
     v0 = np.tile(V, (4, 1))
     v0[2] = 1e5, 3e7
     runs = rd.rollouts(SETUP, starts(4), v0, vary={"kp": np.arange(4.0)}, record=record)
-    path = rd.save_rollouts(runs, tmp_path / "runs")
-    back = rd.load_rollouts(path)
+    path = runs.save(tmp_path / "runs")
+    back = rd.read(path)
     for x, y in zip(arrays(runs), arrays(back), strict=True):
         np.testing.assert_array_equal(x, y)
     assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
     assert back.about["urdf"] == runs.about["urdf"] and back.varied["kp"][3, 0] == 3.0
-    with pytest.raises(
-        rd.RobotDynError, match=r"is a file of rollouts, which are many runs: rd.load_rollouts reads it"
-    ):
-        rd.load_run(path)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="cannot be read as a run file"):
-        rd.load_rollouts(path)
-    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with rd\.save_rollouts"):
-        rd.load_rollouts(tmp_path / "none.npz")
-    with pytest.raises(rd.RobotDynError, match="got Rollouts; save_rollouts takes"):
-        rd.save_run(runs, path)
+        rd.read(path)
+    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with run\.save"):
+        rd.read(tmp_path / "none.npz")
 
 
 @pytest.mark.parametrize("read", [False, True])
 def test_a_run_of_a_batch_is_saved_drawn_and_replayed(read: bool, tmp_path: Path) -> None:
     """With what it has: torques and energies that nobody recorded are not drawn."""
     runs = rd.rollouts(PID, starts(2))
-    runs = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs")) if read else runs
+    runs = rd.read(runs.save(tmp_path / "runs")) if read else runs
     run = runs[1]
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     np.testing.assert_array_equal(again.q, run.q)
-    assert rd.save_replay(run, tmp_path / "run").stat().st_size > 10_000
+    assert rd.replay(run).save(tmp_path / "run").stat().st_size > 10_000
     assert rd.plot(run).axes
     for name in ("torques", "energy"):
         with pytest.raises(rd.RobotDynError, match="not recorded; add"):
@@ -383,7 +384,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
         r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
-            "q0": starts(4), "most_bytes": 100,
+            "q0": starts(4), "max_bytes": 100,
         },
     }.items():  # fmt: skip
         with pytest.raises(rd.RobotDynError, match=message):
@@ -435,7 +436,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
     q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
     for method in ("RK4", "DOP853"):
         runs = rd.rollouts(setup, q0, 0 * q0, method=rd.integrate.method(method) if method == "RK4" else method)
-        back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / method))
+        back = rd.read(runs.save(tmp_path / method))
         for i in range(3):
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
             assert runs.outcome(i).ending == alone.outcome.ending == "finished" and back.outcome(i) == runs.outcome(i)

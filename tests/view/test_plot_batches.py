@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import plot, save_plot
+from robot_dyn import plot
 from robot_dyn.foundations import QueryError
 from robot_dyn.view import PlotError
 from robot_dyn.view.plots.batch import BATCH_PLOTS, LEVELS
@@ -97,7 +97,7 @@ def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> Non
 
 
 def test_a_batch_of_which_all_diverged_is_drawn(some_lost, tmp_path) -> None:
-    save_plot(some_lost[5:6], tmp_path / "lost.png", "fan", "outcomes", "scatter", x="start q joint_1", dpi=40)
+    plot(some_lost[5:6], "fan", "outcomes", "scatter", x="start q joint_1").save(tmp_path / "lost.png", dpi=40)
     with pytest.raises(PlotError, match="no run that did not diverge"):
         plot(some_lost[5:6], "histogram")
 
@@ -126,7 +126,7 @@ def test_all_parts_fit_a_page_and_are_named(some_lost, tmp_path) -> None:
     for name in BATCH_PLOTS:
         for suffix in (".png", ".svg", ".pdf"):
             assert (
-                save_plot(some_lost, tmp_path / f"{name}{suffix}", name, joints="joint_2", dpi=30).stat().st_size > 1000
+                plot(some_lost, name, joints="joint_2").save(tmp_path / f"{name}{suffix}", dpi=30).stat().st_size > 1000
             )
 
 

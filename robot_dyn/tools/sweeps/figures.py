@@ -253,7 +253,7 @@ class UserFigure(Value):
         if self.stated is not None:
             raise SweepError(
                 f"the folder names the function {self.path} as a figure, which is called only if you name it:"
-                f" sw.read(folder, figures={{NAME: {self.path!r}}}), or --figure NAME={self.path}"
+                f" sw.read_sweep(folder, figures={{NAME: {self.path!r}}}), or --figure NAME={self.path}"
             )
         return imported(self.path)
 

@@ -82,7 +82,7 @@ class Sweep(Answer, Value):
         if self.stated is not None:
             raise SweepError(
                 f"the folder names the function {self.scene} as its scene, which is called only if you name it:"
-                f" sw.read(folder, scene={self.scene!r}), or --scene {self.scene}"
+                f" sw.read_sweep(folder, scene={self.scene!r}), or --scene {self.scene}"
             )
         if is_scene(self.scene):
             from robot_dyn.scene import read_both  # imported here because functions do not need it

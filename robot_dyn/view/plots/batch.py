@@ -20,7 +20,7 @@ from robot_dyn.simulation.results.samples import tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending, Reason
 from robot_dyn.view.plots.figure import LOST, TIME, Axes, Cell, Curve, Style
-from robot_dyn.view.plots.parts import PlotError
+from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)

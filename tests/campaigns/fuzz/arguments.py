@@ -44,7 +44,7 @@ def seeds(folder: Path) -> list[list[str]]:
 
     scene = folder / "scene.toml"
     scene.write_text(starter("cart_pole").replace("4.0", "0.02", 1), encoding="utf-8")
-    rd.save_run(rd.simulate(rd.read_scene(scene)), folder / "run.npz")
+    rd.simulate(rd.read_scene(scene)).save(folder / "run.npz")
     if os.name == "posix":
         os.mkfifo(folder / "pipe")
     return [line.split() for line in LINES]
