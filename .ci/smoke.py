@@ -28,8 +28,8 @@ np.testing.assert_allclose(many.q[2], runs[0].q, rtol=0, atol=1e-11)
 rd.simulate(plant, q0=q, duration_s=0.2)
 
 with tempfile.TemporaryDirectory() as folder:
-    path = rd.save_run(runs[1], Path(folder) / "run.npz")
-    np.testing.assert_array_equal(rd.load_run(path).q, runs[1].q)
-    rd.save_plot(runs[1], Path(folder) / "run.png")
-    rd.save_replay(runs[1], Path(folder) / "run.html")
+    path = runs[1].save(Path(folder) / "run.npz")
+    np.testing.assert_array_equal(rd.read(path).q, runs[1].q)
+    rd.plot(runs[1]).save(Path(folder) / "run.png")
+    rd.replay(runs[1]).save(Path(folder) / "run.html")
 print("Python", sys.version.split()[0], *(f"{name} {version(name)}" for name in ("pin", "numpy", "scipy", "llvmlite")))

@@ -2,11 +2,11 @@
 
 An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q)`, …
 Other formulations  Lagrangian, compiled, euler_lagrange
-What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
+What it answers     info (an arm), why (a torque by cause), explain (what is integrated), parameters (that can vary)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
-To look at          replay, show, plot, save_replay, save_plot, diff_runs
-To keep             save_run, load_run, save_rollouts, load_rollouts, export
+To look at          replay, show, plot, diff_runs
+To keep             `.save(path)` of a run, a batch, a page, a figure or a result; read (a run, a batch)
 What comes of it    Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 
 Rooms, whose docstrings list what is in them: effects (friction, springs, stops, limits, …), control (controllers,

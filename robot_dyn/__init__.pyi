@@ -25,21 +25,15 @@ from robot_dyn.scene.explain import explain as explain
 from robot_dyn.scene.scene import read_scene as read_scene
 from robot_dyn.simulation.dynamics.event import Event as Event
 from robot_dyn.simulation.dynamics.linearise import linearise as linearise
-from robot_dyn.simulation.export.export import export as export
-from robot_dyn.simulation.results.run_file import load_run as load_run
-from robot_dyn.simulation.results.run_file import save_run as save_run
 from robot_dyn.simulation.results.trajectory import Trajectory as Trajectory
-from robot_dyn.simulation.rollouts.file import load_rollouts as load_rollouts
-from robot_dyn.simulation.rollouts.file import save_rollouts as save_rollouts
+from robot_dyn.simulation.rollouts.parameters import parameters as parameters
+from robot_dyn.simulation.rollouts.read import read as read
 from robot_dyn.simulation.rollouts.result import Rollouts as Rollouts
 from robot_dyn.simulation.rollouts.rollouts import rollouts as rollouts
-from robot_dyn.simulation.rollouts.sweepable import sweepable as sweepable
 from robot_dyn.simulation.setup.setup import Setup as Setup
 from robot_dyn.simulation.simulate import simulate as simulate
 from robot_dyn.view.plots.plots import plot as plot
-from robot_dyn.view.plots.plots import save_plot as save_plot
 from robot_dyn.view.replay import replay as replay
-from robot_dyn.view.replay import save_replay as save_replay
 from robot_dyn.view.replay import show as show
 
 __version__: str

@@ -31,4 +31,4 @@ if __name__ == "__main__":
     print("\n".join(f"left out: {each}" for each in result.left_out))
     print(", ".join(f"{key} {value}" for key, value in result.environment.items()))
     if not options.quick:
-        rd.accuracy.save_result(result, PICTURES / f"cost_{name}.png")
+        result.save(PICTURES / f"cost_{name}.png")

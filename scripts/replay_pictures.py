@@ -68,7 +68,7 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         for name in list(ARMS)[: 1 if quick else None]:
             run = motion(name)
-            page = rd.save_replay(run, Path(pages) / f"{name}.html")
+            page = rd.replay(run).save(Path(pages) / f"{name}.html")
             photograph(browser, page, folder / f"{name}.png", t=0.8)
             print(f"{folder / name}.png: {run.outcome.ending}, page of {page.stat().st_size / 1e6:.1f} MB")
         browser.close()

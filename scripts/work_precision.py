@@ -37,4 +37,4 @@ if __name__ == "__main__":
         print(f"\n## {each}\n", flush=True)
         result = rd.accuracy.work_precision(setup(each), budget_s=options.budget)
         say(result)
-        rd.accuracy.save_result(result, PICTURES / f"accuracy_{each}.png")
+        result.save(PICTURES / f"accuracy_{each}.png")

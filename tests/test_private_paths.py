@@ -45,9 +45,9 @@ def test_a_run_finds_its_meshes_from_its_own_folder(arm, tmp_path, runs: str) ->
     """Beside the URDF, below it, in a sibling; and after all of it has moved."""
     folder = arm.parent / runs
     folder.mkdir(exist_ok=True)
-    file = rd.save_run(run_of(arm), folder / "run.npz")
+    file = run_of(arm).save(folder / "run.npz")
     assert str(tmp_path) not in inside(file) and "secret" not in inside(file)
-    assert document_of((rd.load_run(file),), (), None, False)["problems"] == []
+    assert document_of((rd.read(file),), (), None, False)["problems"] == []
     moved = tmp_path / "elsewhere"
     os.rename(tmp_path / "secret", moved)
     here = (
@@ -55,7 +55,7 @@ def test_a_run_finds_its_meshes_from_its_own_folder(arm, tmp_path, runs: str) ->
         if file.exists()
         else moved / "robots" / runs / file.name
     )
-    assert document_of((rd.load_run(here),), (), None, False)["problems"] == []
+    assert document_of((rd.read(here),), (), None, False)["problems"] == []
 
 
 def test_a_run_far_from_the_urdf_finds_it_in_the_home_folder(arm, tmp_path, monkeypatch) -> None:
@@ -70,16 +70,16 @@ def test_a_run_far_from_the_urdf_finds_it_in_the_home_folder(arm, tmp_path, monk
 
 def test_a_robot_of_the_catalog_is_known_by_its_file_name(tmp_path) -> None:
     """Its meshes are found in the package, wherever that is installed."""
-    file = rd.save_run(run_of("ur5"), tmp_path / "run.npz")
+    file = run_of("ur5").save(tmp_path / "run.npz")
     assert "site-packages" not in inside(file)
-    again = rd.load_run(file)
+    again = rd.read(file)
     assert Path(again.about["source"]).name == "ur5_robot.urdf"
     assert document_of((again,), (), None, False)["problems"] == []
 
 
 def test_a_run_read_again_is_the_same_robot(arm, tmp_path) -> None:
     run = run_of(arm)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
+    again = rd.read(run.save(tmp_path / "run.npz"))
     assert again.about == run.about | {"file": "run.npz"}
     assert robot_of(again).description == robot_of(run).description
 
@@ -106,7 +106,7 @@ def test_no_page_and_no_warning_shows_a_path_of_the_machine(arm, tmp_path) -> No
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         page = document_of((run_of(arm),), (), None, True)
-        rd.save_replay(run_of(arm), tmp_path / "page.html")
+        rd.replay(run_of(arm)).save(tmp_path / "page.html")
     assert len(page["problems"]) >= len(ADDRESSES)
     texts = [*page["problems"], *page["notes"], page["title"], page["outcome"], *(str(each.message) for each in told)]
     assert not re.search(r"alice/|alice\\|secret|" + re.escape(str(tmp_path)), "\n".join(texts))

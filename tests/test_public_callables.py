@@ -29,7 +29,6 @@ MEASURE = {
     "max_payload",
     "path",
     "prove",
-    "save_plot",
     "work_precision",
 }  # seconds
 
@@ -122,9 +121,7 @@ def test_equal_runs_and_setups_do_not_raise() -> None:
         lambda robot, run: rd.simulate(robot, duration_s=1.0),
         lambda robot, run: rd.simulate("ur5"),
         lambda robot, run: rd.linearise("ur5", [0.0]),
-        lambda robot, run: rd.save_run(
-            rd.rollouts(rd.Setup(rd.Plant(robot), [0.1, 0.2], duration_s=0.01), method="RK4"), "x.npz"
-        ),
+        lambda robot, run: run.save("run.xlsx"),
         lambda robot, run: rd.plot(run, run),
         lambda robot, run: rd.Robot(robot.model),
         lambda robot, run: rd.Setup(rd.Plant(robot), [0.1, 0.2], record_every_s=1e-320),

@@ -254,7 +254,7 @@ def test_options_by_keyword_complete_in_a_session() -> None:
     for text, names in {
         "arm.with_(": ["gravity=", "payload=", "mass_scale="],
         "rd.simulate(arm, ": ["duration_s=", "controller=", "on_progress="],
-        "rd.rollouts(arm, ": ["duration_s=", "params="],
+        "rd.rollouts(arm, ": ["duration_s=", "vary="],
         "rd.advise(arm, ": ["duration_s=", "controller="],
     }.items():
         with provisionalcompleter():

@@ -4,9 +4,9 @@
     certify            true digits of M, C, N, inverse and forward dynamics, against balls (Certificate)
     digits             correct digits of one answer; warn_below: a robot whose queries warn of few
     cost               instructions and times of effects, control and algorithms (Cost)
-    save_result        any of these as figure, CSV or JSON
     Ball               an arithmetic of numbers with a radius; midpoint, radius
 
+`.save(path)` of a result writes its figure, CSV or JSON.
 Results of functions of `rd`: Comparison (compare), Advice (advise), RunDifference (diff_runs).
 robot_dyn/accuracy/README.md lists its files.
 """

@@ -13,7 +13,6 @@ from robot_dyn.cross_check.compare import Comparison as Comparison
 from robot_dyn.foundations.arithmetic import Ball as Ball
 from robot_dyn.foundations.arithmetic import midpoint as midpoint
 from robot_dyn.foundations.arithmetic import radius as radius
-from robot_dyn.report.save import save_result as save_result
 
 __all__: list[str]
 

@@ -1,8 +1,9 @@
-"""Whether steps are short enough: stability about states of a motion, and the error to expect.
+"""Advice on step and control period: linear stability at states of a motion, and the error to expect.
 
-It is that of the method and of the loop, however short the run: by how much deviations grow over it is said beside.
-J, and the derivatives of a sampled loop, are taken at the fastest of some states along a pilot run with control at all
-times; a motion that leaves them behind may be stable with longer steps, or unstable with shorter ones.
+Stability is a property of the method and of the loop, not of the duration; the growth of deviations over the run is
+reported separately. The Jacobian J and the linearised sampled loop are evaluated at the fastest states of a pilot run
+with continuous control. A motion that departs from these states may be stable with longer steps, or unstable with
+shorter ones.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import exp, inf, isfinite
-from typing import Any, Unpack, final
+from typing import Unpack, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
@@ -21,6 +23,7 @@ from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError, RobotDynError, escaped
 from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units
@@ -46,10 +49,10 @@ from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 
-_LOOKS = 9  # states along the pilot run
-_FAST = 3  # of them, where motion is fastest: limits are looked for there
-_MOST_STEPS = 200_000  # of a run that is made for its error estimate
-_BEARS = 1e3  # growth of deviations over such a run
+_PILOT_STATES = 9  # along the pilot run
+_FAST_STATES = 3  # of these, the fastest ones, at which limits are computed
+_MAX_STEPS = 200_000  # in a run for the error estimate
+_MAX_GROWTH = 1e3  # of deviations over such a run
 
 State = tuple[float, Array]  # t and y
 
@@ -57,23 +60,25 @@ State = tuple[float, Array]  # t and y
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice(Answer):
-    """What may be expected of a setup.
+    """Stability limits of the step and the control period of a setup, and the error to expect.
 
     Attributes:
         method: The method of the setup.
-        step_s: Its longest step, in [s]; 0 if it chooses its steps.
-        fastest: The fastest motion along a pilot run, with joint and source.
-        at: When it was met, in [s].
-        limits: Longest stable step of the setup's method and each other of fixed step, in [s]; inf where every step is.
-        period_s: Period of the sampled control, in [s]; 0 without.
-        longest_period_s: The period up to which the loop is stable, in [s]; 0 if it is stable at
-            none, inf if at every one, or without sampled control.
-        at_period: What the loop is at its own period, which may be stable though a shorter one is not.
-        period_growth: Spectral radius: the factor by which deviations grow in each period in the long run; 1 without.
-        grows_anyway: Rate at which they grow under the same control at all times, in [1/s]; 0 if they do not.
-        growth: Factor by which they grow over the run, by steps or periods that are too long.
-        run: The run of the setup with its error estimate; None if deviations grow a thousandfold in it, or it has too
-            many steps.
+        step_s: Its longest step, in [s]; 0 if the method chooses its steps.
+        fastest: The fastest motion along the pilot run, with joint and source.
+        at: Time of that motion, in [s].
+        limits: Longest stable step of the setup's method and of every other fixed-step method, in [s]; inf if every
+            step is stable.
+        period_s: Period of the sampled control, in [s]; 0 without sampled control.
+        longest_period_s: The period up to which the loop is stable, in [s]. It is 0 if no period is stable; inf if
+            every period is, or without sampled control.
+        at_period: Stability of the loop at its period. This period may be stable although a shorter one is not.
+        period_growth: Spectral radius: the asymptotic growth factor of deviations per period; 1 without sampled
+            control.
+        grows_anyway: Growth rate of deviations under the same control in continuous time, in [1/s]; 0 if they decay.
+        growth: Factor by which deviations grow over the run because steps or periods are too long.
+        run: The run of the setup with its error estimate; None if deviations would grow a thousandfold, or the run
+            has too many steps.
     """
 
     method: str
@@ -91,12 +96,12 @@ class Advice(Answer):
 
     @reported
     def stable(self) -> bool:
-        """Whether the step is within its limit, and deviations do not grow at the period."""
+        """True if the step is within its limit and deviations do not grow at the control period."""
         return self.step_s <= self.limits.get(self.method, inf) and self.at_period is not Stability.UNSTABLE
 
     @reported
     def text(self) -> str:
-        """A line for each thing: the step, the period, growth over the run, the error, the fastest motion."""
+        """Step, control period, growth over the run, error and fastest motion, a line for each."""
         parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
         return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at:.3g} s"]))
 
@@ -118,21 +123,21 @@ class Advice(Answer):
 
     @reported
     def error_verdict(self) -> Verdict | None:
-        """What it rests on."""
+        """Verdict on the error estimate; None without one."""
         return None if self.run is None or self.run.error is None else self.run.error.verdict
 
     def _of_step(self) -> str:
         limit = self.limits.get(self.method, inf)
         if not self.step_s:
-            return f"{self.method} chooses its steps, so that none is unstable for long"
+            return f"{self.method} controls its steps, which keeps them stable"
         if not isfinite(limit):
-            return f"step {self.step_s:.3g} s: stable, as every step of {self.method} is here"
+            return f"step {self.step_s:.3g} s: stable; every step of {self.method} is stable here"
         if self.step_s <= limit:
-            return f"step {self.step_s:.3g} s: stable; {self.method} is up to {limit:.3g} s"
+            return f"step {self.step_s:.3g} s: stable; {self.method} is stable up to {limit:.3g} s"
         best = max(FIXED_STEP, key=lambda name: (min(self.limits[name], 2 * self.step_s), method(name).order))
         other = f", or method={best!r}" if self.limits[best] >= self.step_s else ""
         return (
-            f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: take"
+            f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: use"
             f" step_s={below(limit)}{other}"
         )
 
@@ -141,24 +146,24 @@ class Advice(Answer):
             return
         limit, unstable = self.longest_period_s, self.at_period is Stability.UNSTABLE
         if unstable and not limit:
-            to = f", as every period is: take {remedy(self.grows_anyway)}"
+            verdict = f"; no period is stable: use {remedy(self.grows_anyway)}"
         elif unstable:
-            to = f"; the loop is stable up to {limit:.3g} s: use period_s={below(limit)}, or lower gains"
+            verdict = f"; the loop is stable up to {limit:.3g} s: use period_s={below(limit)}, or lower gains"
         elif self.period_s > limit:
-            to = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
+            verdict = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
         else:
-            to = f"; the loop is up to {limit:.3g} s" if isfinite(limit) else "; as every period is here"
-        between = ", some deviations neither decay nor grow" * (self.at_period is Stability.MARGINAL)
-        yield f"control period {self.period_s:.3g} s: {self.at_period}{between}{to}"
+            verdict = f"; the loop is stable up to {limit:.3g} s" if isfinite(limit) else "; every period is stable"
+        marginal = ", some deviations neither decay nor grow" * (self.at_period is Stability.MARGINAL)
+        yield f"control period {self.period_s:.3g} s: {self.at_period}{marginal}{verdict}"
 
     def _of_growth(self) -> Iterator[str]:
         if not self.stable:
-            each = f", by {shown(self.period_growth)} in each period" * (self.at_period is Stability.UNSTABLE)
-            yield f"over this run deviations grow by {shown(self.growth)}{each}"
+            per_period = f", by {shown(self.period_growth)} in each period" * (self.at_period is Stability.UNSTABLE)
+            yield f"over this run deviations grow by {shown(self.growth)}{per_period}"
 
     def _of_error(self) -> str:
         if self.run is None:
-            return "error to expect: not estimated for a run in which deviations grow so, or of too many steps"
+            return "error to expect: not estimated, because deviations grow too much or the run has too many steps"
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
             return f"the run {end.ending} at {end.t:.3g} s: {end.text}"
@@ -167,50 +172,62 @@ class Advice(Answer):
 
 
 @takes_options
-def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **options: Unpack[Options]) -> Advice:
-    """Whether the step of a setup and the period of its control are short enough, and what error to expect.
+def advise(
+    what: Setup | Plant | Dynamics,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    **options: Unpack[Options],
+) -> Advice:
+    """Report whether the step and the control period of a setup are short enough, and estimate the error.
 
     Args:
-        what: What to run, as of `simulate`.
-        q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
-        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
-        **options: As of `simulate`.
+        what: A setup, or a plant or robot with a start, see `simulate`.
+        q0: Initial position, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
+        **options: Options of the setup, see `simulate`.
 
     Raises:
         QueryError: If the setup is not allowed, or its motion cannot be linearised at any state of the pilot run.
     """
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
-    advice = advice_about(setup, _along)
-    worthwhile = advice.growth < _BEARS and (setup.method.controls_error or setup.steps <= _MOST_STEPS)
+    advice = advice_about(setup, _pilot_states)
+    worthwhile = advice.growth < _MAX_GROWTH and (setup.method.controls_error or setup.steps <= _MAX_STEPS)
     return replace(advice, run=simulate(replace(setup, estimate_error=True))) if worthwhile else advice
 
 
 def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[State]]) -> Advice:
-    """The same without a run.
+    """Return the advice on a setup without an error estimate.
 
     Args:
-        setup: As of `simulate`.
-        states_of: Gives times and states y of the setup, by its state equation with control at all times.
+        setup: The setup.
+        states_of: Function of the setup and of its state equation with continuous control. It returns the times and
+            states y at which to linearise.
+
+    Raises:
+        QueryError: If the motion cannot be linearised at any of the states.
     """
     plant, controller, duration = setup.plant, setup.controller, setup.duration_s
     if plant.equation_of_motion.payloads:
-        raise QueryError("advise: carried_payload changes the bodies in the run; ask of plant.at(t), t in [s]")
+        raise QueryError("advise: carried_payload changes the bodies during the run; use plant.at(t), t in [s]")
     if coupled := [x.name for x in plant.equation_of_motion.drives.values() if x.coupled]:
-        raise QueryError(f"advise: {coupled[0]} frees and couples motors by turns, and no one linearisation holds")
+        raise QueryError(f"advise: {coupled[0]} couples and releases motors in turn; no single linearisation is valid")
     period = 0.0 if controller is None else controller.period_s
     loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
     motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
-    n, own = plant.dynamics.n, setup.method
-    methods = {name: method(name) for name in FIXED_STEP} | ({} if own.controls_error else {own.name: own})
-    limits = {name: min(longest_step(each, J, n) for J in matrices) for name, each in methods.items()}
-    step = 0.0 if own.controls_error else setup.taken_step_s
-    sampled = [] if controller is None or not period else [(controller, t, _own(loop, y)) for t, y in states]
-    loops = [linearised(plant, *state) for state in sampled]
-    factors = [after(each.factor(period), periods(duration, period)) for each in loops]
-    factors += [exp(min(max(0.0, excess_rate(own, J, n)(step)) * duration, LARGEST)) for J in matrices if step]
+    n, chosen = plant.dynamics.n, setup.method
+    methods = {name: method(name) for name in FIXED_STEP}
+    step, own_rates = 0.0, []
+    if isinstance(chosen, Integrator):
+        methods |= {chosen.name: chosen}
+        step, own_rates = setup.taken_step_s, [excess_rate(chosen, J, n) for J in matrices]
+    limits = {name: min(longest_step(candidate, J, n) for J in matrices) for name, candidate in methods.items()}
+    law = controller if period else None
+    loops = [] if law is None else [linearised(plant, law, t, _without_works(loop, y)) for t, y in states]
+    factors = [after(sampled.factor(period), periods(duration, period)) for sampled in loops]
+    factors += [exp(min(max(0.0, rate(step)) * duration, LARGEST)) for rate in own_rates]
     return Advice(
-        method=own.name,
+        method=chosen.name,
         step_s=step,
         fastest=motion,
         at=at,
@@ -225,57 +242,57 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
 
 
 def at_rest(setup: Setup, loop: StateEquation) -> list[State]:
-    """The start alone: enough where it is an equilibrium."""
+    """Return the initial state alone, which suffices if it is an equilibrium."""
     return [(0.0, loop.start(setup.q0, setup.v0))]
 
 
-def _along(setup: Setup, loop: StateEquation) -> list[State]:
-    """Times and states y along a run with control at all times."""
+def _pilot_states(setup: Setup, loop: StateEquation) -> list[State]:
+    """Return times and states y along a run with continuous control."""
     run = simulate(
         Setup(
             setup.plant, setup.q0, setup.v0, duration_s=setup.duration_s, controller=loop.controller,
-            engine=setup.engine, record_every_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
+            engine=setup.engine, record_every_s=setup.duration_s / (_PILOT_STATES - 1), estimate_error=False,
         )
     )  # fmt: skip
     z = [] if run.controller_states is None else [run.controller_states]
     y = np.zeros((len(run.t), loop.size))
-    known = np.hstack([run.q, run.v, *z, *run.effect_states.values()])
-    y[:, : known.shape[1]] = known
-    good = np.isfinite(y).all(axis=1)
-    states = list(zip(run.t[good].tolist(), y[good], strict=True))
-    return [*states, *_pressed(setup.plant, run, states)]
+    recorded = np.hstack([run.q, run.v, *z, *run.effect_states.values()])
+    y[:, : recorded.shape[1]] = recorded
+    finite = np.isfinite(y).all(axis=1)
+    states = list(zip(run.t[finite].tolist(), y[finite], strict=True))
+    return [*states, *_in_stops(setup.plant, run, states)]
 
 
-def _pressed(plant: Plant, run: Trajectory, states: list[State]) -> Iterator[State]:
-    """The states with joints as far beyond soft stops as they come, which is between the samples."""
-    least, most = (np.zeros(plant.dynamics.n),) * 2 if run.extremes is None else run.extremes[0]
+def _in_stops(plant: Plant, run: Trajectory, states: list[State]) -> Iterator[State]:
+    """Return states with a joint at its deepest penetration of a soft stop, which lies between the samples."""
+    lowest, highest = (np.zeros(plant.dynamics.n),) * 2 if run.extremes is None else run.extremes[0]
     for stop in plant.effects:
         if isinstance(stop, JointStopSpring):
-            for far, beyond in ((least, least < stop.lower), (most, most > stop.upper)):
+            for extreme, beyond in ((lowest, lowest < stop.lower), (highest, highest > stop.upper)):
                 for i in np.flatnonzero(beyond):
-                    t, y = min(states, key=lambda each, i=i, far=far: abs(each[1][i] - far[i]))
-                    yield t, np.where(np.arange(len(y)) == i, far[i], y)
+                    t, y = min(states, key=lambda state, i=i, extreme=extreme: abs(state[1][i] - extreme[i]))
+                    yield t, np.where(np.arange(len(y)) == i, extreme[i], y)
 
 
-def _own(equation: StateEquation, y: Array) -> Array:
-    """(q, v, z) of y, without works."""
+def _without_works(equation: StateEquation, y: Array) -> Array:
+    """Return (q, v, z), the state y without the works."""
     return y[: len(y) - len(equation.sources)]
 
 
 def _between_ticks(plant: Plant, loop: StateEquation, t: float, y: Array) -> Array:
-    """J where the actuation is held."""
+    """Return J for constant actuation, as between two ticks."""
     free, n, z = StateEquation(plant, None).in_a_mode, plant.dynamics.n, loop.state_size
-    bodies = np.concatenate([y[: 2 * n], _own(loop, y)[2 * n + z :], np.zeros(len(free.sources))])
+    bodies = np.concatenate([y[: 2 * n], _without_works(loop, y)[2 * n + z :], np.zeros(len(free.sources))])
     return jacobian(free, t, bodies, np.zeros(n))
 
 
 def _fastest(equation: StateEquation, states: list[State]) -> tuple[Fastest, float, list[State]]:
-    """The fastest motion at some states, when, and the states where motion is fastest."""
-    found: list[tuple[Fastest, float, Array]] = []
+    """Return the fastest motion at some states, its time, and the few states of fastest motion."""
+    motions: list[tuple[Fastest, float, Array]] = []
     for t, y in states:
         with suppress(RobotDynError, np.linalg.LinAlgError):
-            found.append((fastest(equation, t, y, None), t, y))
-    if not found:
-        raise QueryError("the motion cannot be linearised at any state of a run; take a shorter one")
-    found.sort(key=lambda each: -abs(each[0].eigenvalue))
-    return *found[0][:2], [each[1:] for each in found[:_FAST]]
+            motions.append((fastest(equation, t, y, None), t, y))
+    if not motions:
+        raise QueryError("the motion cannot be linearised at any state of the pilot run; use a shorter run")
+    motions.sort(key=lambda motion: -abs(motion[0].eigenvalue))
+    return *motions[0][:2], [motion[1:] for motion in motions[:_FAST_STATES]]

@@ -27,19 +27,19 @@ from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 
 QUANTITIES = {name: quantity for name, quantity in QUERIES.items() if quantity.digits}
 
-_COUNTED = 64  # joints; balls of more take many seconds
+_MAX_JOINTS = 64  # for a count; with more joints balls take many seconds
 
 _exact = lru_cache(maxsize=8)(Exact)
 _lagrangian = lru_cache(maxsize=8)(Lagrangian)
 
 
-@lru_cache(maxsize=8)  # each query of a robot with a `DigitCheck` asks for it
+@lru_cache(maxsize=8)  # every query of a robot with a `DigitCheck` needs it
 def _unchecked(robot: Robot) -> Robot:
     return replace(robot, answer_check=None)
 
 
 def digits_of(error: float) -> float:
-    """Decimal digits that an error leaves, from 0 to 20."""
+    """Return −log10 of an error, limited to 0…20; 0 for nan."""
     return min(max(-log10(max(error, RESOLUTION)), 0.0), float(MOST_DIGITS)) if error == error else 0.0
 
 
@@ -49,16 +49,16 @@ def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
         −log10(error),  from 0 to 20
 
     Errors are relative to √(M_ii M_jj) for M; for C, N and inverse dynamics to the largest entry in the units √M_ii of
-    the joints; for forward dynamics to Σ ‖M⁻¹ τ_k‖ of τ, C v and N, in the norm of M. An answer that cancels to nearly
-    nothing has few digits. Numbers of the file count as the decimals written. A count takes milliseconds.
+    the joints; for forward dynamics to Σ ‖M⁻¹ τ_k‖ of τ, C v and N, in the norm of M. An answer whose terms nearly
+    cancel has few digits. The decimals written in the file are taken as exact. A count takes milliseconds.
 
     Args:
         robot: The robot.
         quantity: "M", "C", "N", "inverse_dynamics" or "forward_dynamics".
-        *state: Arguments of that query at one state, shape (n,) each.
+        *state: Arguments of that query at one state, each of shape (n,).
 
     Raises:
-        QueryError: If there is no such quantity, or an argument is wrong.
+        QueryError: If the quantity does not exist, or an argument is invalid.
         SingularError: If M is singular and the quantity is forward dynamics; names the joint.
     """
     robot = warn_below(robot, None)
@@ -78,16 +78,16 @@ def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
 def warn_below(robot: Robot, digits: float | None) -> Robot:
     """Return a robot whose queries warn (`PrecisionWarning`) if their answers have fewer digits.
 
-    M, C, N, inverse and forward dynamics are checked. Digits are counted only where an estimate, 8 n u κ of the terms,
-    is below the limit, for up to 64 joints. A count takes milliseconds. Machine code of the robot does not warn.
-    `rd.load` returns a nearly singular robot with a check of 8 digits.
+    M, C, N, inverse and forward dynamics are checked. Digits are first estimated from the error bound 8 n u κ of the
+    terms; they are counted only if the estimate is below the limit, for up to 64 joints. A count takes milliseconds.
+    Machine code of the robot does not warn. `rd.load` returns a nearly singular robot with a check of 8 digits.
 
     Args:
         robot: The robot.
-        digits: From above 0 to 20; None for a robot whose queries never warn.
+        digits: Limit, above 0 and at most 20; None for a robot whose queries never warn.
 
     Raises:
-        QueryError: If an argument is wrong.
+        QueryError: If an argument is invalid.
     """
     robot = instance("robot", robot, Robot, "give one of rd.load")
     if digits is None:
@@ -98,7 +98,7 @@ def warn_below(robot: Robot, digits: float | None) -> Robot:
 @final
 @dataclass(frozen=True)
 class DigitCheck:
-    """A check of answers: it warns if they have too few digits.
+    """A check of answers that warns of too few correct digits.
 
     Attributes:
         digits: The number of digits below which it warns.
@@ -109,7 +109,7 @@ class DigitCheck:
     def __post_init__(self) -> None:
         digits = number("digits", self.digits, above=0)
         if digits > MOST_DIGITS:
-            raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}: no more are counted")
+            raise QueryError(f"digits must be at most {MOST_DIGITS}, the most that are counted, got {digits:g}")
         object.__setattr__(self, "digits", digits)
 
     def __call__(self, robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:
@@ -131,20 +131,20 @@ class DigitCheck:
         ]
         if not bounds or digits_of(max(bounds)) >= self.digits:
             return
-        worst, counts = int(np.argmax(bounds)), robot.n <= _COUNTED
-        held = _counted(robot, requested, states[worst]) if counts else digits_of(bounds[worst])
-        if held < self.digits:
+        worst, counts = int(np.argmax(bounds)), robot.n <= _MAX_JOINTS
+        correct = _counted(robot, requested, states[worst]) if counts else digits_of(bounds[worst])
+        if correct < self.digits:
             has = "has" if counts else "is only certain to have"
             where = f" in row {worst} of the batch" if batch else ""
             message = (
-                f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {self.digits:g}; use"
+                f"{quantity} of {robot.name} {has} {correct:.1f} digits{where}, fewer than {self.digits:g}; use"
                 " rd.Lagrangian(robot, np.longdouble), or rd.accuracy.Ball(bits) for digits that are proven"
             )
             warnings.warn(message, PrecisionWarning, stacklevel=4)  # at the query
 
 
 def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answer: np.ndarray) -> float:
-    """An estimate of the error from above."""
+    """Return an upper estimate of the error of an answer."""
     inertia, least = robot.M(state["q"]), 8 * robot.n * float(np.finfo(float).eps) / 2
     if quantity.definite:
         return least
@@ -152,11 +152,12 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
     terms = np.asarray(quantity.terms(magnitudes(_lagrangian(robot).linkage, state["q"]), absolute))
     if quantity.solves:
         torques = (state["tau"], robot.coriolis_torque(state["q"], state["v"]), robot.N(state["q"]))
-        more = acceleration_norm(inertia, torques, terms) / max(float(solved_norm(inertia, torques)), 1e-300)
-        return solved_tolerance(0.0, inertia) * more
+        cancellation = acceleration_norm(inertia, torques, terms) / max(float(solved_norm(inertia, torques)), 1e-300)
+        return solved_tolerance(0.0, inertia) * cancellation
     units = entry_units(quantity, inertia)
     return least * float(np.max(terms / units)) / max(float(np.max(np.abs(answer) / units)), 1e-300)
 
 
 def _counted(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+    """Return the digits of one query, counted against its true value."""
     return digits_of(_exact(robot).at(quantity, state).error(quantity.ask(robot, state)))

@@ -1,11 +1,11 @@
-"""Two runs of one robot compared: by joint, when they part, and in what their settings differ."""
+"""Difference of two runs of one robot: by joint, with the time at which they part and the settings that differ."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -32,12 +32,12 @@ class JointDifference:
     """The difference b − a of a quantity of a joint.
 
     Attributes:
-        joint: Its name.
+        joint: Name of the joint.
         quantity: "q", "v" or "u", the actuation.
-        unit: Of the numbers.
-        rms: Root mean square over the common time; nan if one run did not record it.
+        unit: Unit of `rms` and `largest`.
+        rms: Root mean square over the common time; nan if one run did not record the quantity.
         largest: Largest absolute value.
-        at: When, in [s].
+        at: Time of the largest value, in [s].
     """
 
     joint: str
@@ -51,23 +51,25 @@ class JointDifference:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class RunDifference(Result):
-    """What differs between two runs, b − a.
+    """The difference b − a of two runs.
 
     Attributes:
-        robot: Its name.
-        names: Of the two runs.
+        robot: Name of the robot.
+        names: Names of the two runs.
         joints: Rms and largest difference of q, v and u by joint.
-        start, end: The time that both runs have, in [s].
-        samples: Number of times at which they are compared.
-        common: Number of these at which both have a sample; at the others q of one of them is interpolated.
+        start, end: Limits of the time that both runs cover, in [s].
+        samples: Number of times at which the runs are compared.
+        common: Number of these times at which both runs have a sample; at the others one run is interpolated in q.
         fraction: Fraction of the time from start to end that was compared.
-        interpolation: Largest error of interpolation that is allowed for, in the unit of q; 0 if there is none.
-        parted: When q first differs by more than their errors, in [s]; None if it never does.
-        judged_until: Time until which that is known, in [s].
-        bound: What they part beyond, in words.
+        interpolation: Largest interpolation error that is allowed for, in the unit of q; 0 without interpolation.
+        parted: First time at which q differs by more than the errors of the runs, in [s]; None if it never does.
+        judged_until: Time up to which the errors of both runs are known, in [s].
+        bound: The threshold beyond which the runs part, in words.
         settings: The settings that differ.
-        left_out: What is not compared.
-        environment: Versions that the first run was made with.
+        left_out: Notes on everything that was not compared.
+        environment: Software versions of the first run.
+        runs: The two runs.
+        difference: The difference at all times of comparison.
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.run_difference_figure"
@@ -92,16 +94,14 @@ class RunDifference(Result):
 
     @property
     def sentence(self) -> str:
-        """When the runs part, in a sentence."""
+        """One sentence about whether and when the runs part."""
         a, b = self.names
         if self.parted is not None:
             return f"{a} and {b} part at t = {self.parted:.4g} s: q differs by more than {self.bound}"
         if not self.is_conclusive:
             return f"{a} and {b} were compared over {self.fraction:.0%} of the time only: record both at the same times"
-        end = (
-            "" if self.judged_until >= self.end else f" up to t = {self.judged_until:.4g} s, until which both are known"
-        )
-        if not any(each.largest > 0 for each in self.joints):
+        end = "" if self.judged_until >= self.end else f" up to t = {self.judged_until:.4g} s, where an estimate ends"
+        if not any(joint.largest > 0 for joint in self.joints):
             return f"{a} and {b} are equal at all {self.samples} times"
         return f"{a} and {b} do not part{end}: q never differs by more than {self.bound}"
 
@@ -111,9 +111,9 @@ class RunDifference(Result):
         return self.fraction >= HALF
 
     @property
-    def rows(self) -> Iterator[Mapping[str, Any]]:
+    def rows(self) -> Iterator[Mapping[str, object]]:
         """A row for each quantity of each joint."""
-        return (vars(each) for each in self.joints)
+        return (vars(joint) for joint in self.joints)
 
     def tables(self) -> Iterator[Block]:
         between = self.samples - self.common
@@ -122,77 +122,77 @@ class RunDifference(Result):
             f"b − a, {self.start:g} to {self.end:g} s, at {self.samples} times ({where}),"
             f" {self.fraction:.0%} of the time:"
         )
-        rows = tuple(
-            (each.joint, f"{each.quantity} [{each.unit}]", each.rms, each.largest, each.at) for each in self.joints
-        )
+        rows = tuple((row.joint, f"{row.quantity} [{row.unit}]", row.rms, row.largest, row.at) for row in self.joints)
         yield Table(("joint", "quantity", "rms", "largest", "at t [s]"), rows, digits=3)
         yield ""
         if self.settings:
             yield f"settings that differ (a: {self.names[0]}; b: {self.names[1]}):"
-            yield Table(("setting", "a", "b"), tuple((each.name, each.a, each.b) for each in self.settings), wrap=True)
+            rows = tuple((setting.name, setting.a, setting.b) for setting in self.settings)
+            yield Table(("setting", "a", "b"), rows, wrap=True)
         else:
             yield "no setting differs"
         yield ""
 
 
 def diff_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERANCE) -> RunDifference:
-    """Compare two runs of one robot on the time that both have: by joint, when they part, what differs in settings.
+    """Compare two runs of one robot over the time that both cover: differences by joint, and differing settings.
 
-    They are compared at common samples; in stretches without any, q is compared at the samples of either run as well,
-    where quintics of (q, v, a) are known to be exact enough and no event is near. They part where q of a joint differs
-    by more than twice the sum of the estimated errors of both; where a run has no estimate, by more than the tolerance.
-    If less than half of the time can be compared, record both at the same times. Root mean squares are over time:
-    √(1/T ∫ (x_b − x_a)² dt).
+    The runs are compared at common samples. In stretches without common samples, q is also compared at the samples of
+    either run, if quintic interpolation of (q, v, a) is accurate enough and no event is near. The runs part where q of
+    a joint differs by more than twice the sum of their estimated errors, or by more than the tolerance if a run has no
+    estimate. If less than half of the time can be compared, record both runs at the same times. Root mean squares are
+    over time: √(1/T ∫ (x_b − x_a)² dt).
 
     Args:
         a: A run.
-        b: Another one of the same robot.
-        tolerance: In [rad] or [m], for runs without an estimate of their error.
+        b: Another run of the same robot.
+        tolerance: Threshold in [rad] or [m] for runs without an error estimate.
 
     Raises:
-        QueryError: If they are of different robots, or have no time in common.
+        QueryError: If the runs are of different robots, or have no time in common.
     """
     for name, run in (("a", a), ("b", b)):
-        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.load_run, or a run of rollouts")
+        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.read, or a run of rollouts")
     tolerance = number("tolerance", tolerance, above=0, error=QueryError)
-    found, types = difference(a, b, tolerance), joint_types(a)
-    of_q, (first, second) = joint_units("q", types), run_names(a, b)
-    left = [f"{t:g} to {s:g} s, which only {name} has" for name, t, s in _alone(a, b)]
-    if not found.estimated:
-        left.append("the errors of the runs, since one has no estimate; simulate with estimate_error=True")
-    beyond = "twice their estimated errors" if found.estimated else f"{tolerance:g} {of_q}"
-    interpolation = f" and {found.interpolation:.1g} {of_q} of interpolation" if found.interpolation > 0 else ""
+    differences, types = difference(a, b, tolerance), joint_types(a)
+    unit_of_q, (first, second) = joint_units("q", types), run_names(a, b)
+    left_out = [f"{t:g} to {s:g} s, covered by {name} only" for name, t, s in _unshared(a, b)]
+    if not differences.estimated:
+        left_out.append("errors of the runs, because one has no estimate; simulate with estimate_error=True")
+    bound = "twice their estimated errors" if differences.estimated else f"{tolerance:g} {unit_of_q}"
+    if differences.interpolation > 0:
+        bound += f" and {differences.interpolation:.1g} {unit_of_q} of interpolation"
     return RunDifference(
         robot=a.about.get("robot", ""),
         names=(first, second),
-        joints=tuple(_of_joints(found, types)),
-        start=found.start,
-        end=found.end,
-        samples=len(found.t),
-        common=int(found.is_common.sum()),
-        fraction=found.fraction,
-        interpolation=found.interpolation,
-        parted=found.parted,
-        judged_until=found.judged_until,
-        bound=beyond + interpolation,
+        joints=tuple(_joint_differences(differences, types)),
+        start=differences.start,
+        end=differences.end,
+        samples=len(differences.t),
+        common=int(differences.is_common.sum()),
+        fraction=differences.fraction,
+        interpolation=differences.interpolation,
+        parted=differences.parted,
+        judged_until=differences.judged_until,
+        bound=bound,
         settings=differing_settings(a, b),
-        left_out=(*left, *unknown_settings(a, b)),
+        left_out=(*left_out, *unknown_settings(a, b)),
         environment=_versions(a),
         runs=(a, b),
-        difference=found,
+        difference=differences,
     )
 
 
-def _of_joints(found: Difference, types: tuple[str | None, ...]) -> Iterator[JointDifference]:
-    for i, (name, kind) in enumerate(zip(found.joint_names, types, strict=True)):
+def _joint_differences(differences: Difference, types: tuple[str | None, ...]) -> Iterator[JointDifference]:
+    for i, (name, kind) in enumerate(zip(differences.joint_names, types, strict=True)):
         for quantity in ("q", "v", "u"):
-            at = slice(None) if quantity == "q" else found.is_common
-            t, x = found.t[at], getattr(found, quantity)[at, i]
+            at = slice(None) if quantity == "q" else differences.is_common
+            t, x = differences.t[at], getattr(differences, quantity)[at, i]
             yield JointDifference(name, quantity, unit(quantity, kind), _rms(t, x), *_largest(t, x))
 
 
 def _rms(t: np.ndarray, x: np.ndarray) -> float:
-    """Over time, by the trapezoidal rule; nan where x is not known."""
+    """Return the root mean square over time by the trapezoidal rule; nan if x has no samples."""
     if not len(t):
         return nan
     if len(t) == 1:
@@ -204,14 +204,15 @@ def _rms(t: np.ndarray, x: np.ndarray) -> float:
 
 
 def _largest(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+    """Return the largest |x| and its time; nan for both if x has no values."""
     if np.isnan(x).all():
         return nan, nan
     k = int(np.nanargmax(np.abs(x)))
     return float(abs(x[k])), float(t[k])
 
 
-def _alone(a: TrajectoryData, b: TrajectoryData) -> Iterator[tuple[str, float, float]]:
-    """Times that one run has and the other has not, by name."""
+def _unshared(a: TrajectoryData, b: TrajectoryData) -> Iterator[tuple[str, float, float]]:
+    """Return name, start and end of each interval that only one run covers."""
     for name, run, other in zip(run_names(a, b), (a, b), (b, a), strict=True):
         if run.t[0] < other.t[0]:
             yield name, float(run.t[0]), float(other.t[0])
@@ -220,5 +221,5 @@ def _alone(a: TrajectoryData, b: TrajectoryData) -> Iterator[tuple[str, float, f
 
 
 def _versions(run: TrajectoryData) -> dict[str, str]:
-    pairs = (each.partition(" ") for each in run.about.get("versions", "").split(", ") if each)
+    pairs = (part.partition(" ") for part in run.about.get("versions", "").split(", ") if part)
     return {name: version for name, _, version in pairs}

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from robot_dyn.description.edits import Payload
+    from robot_dyn.simulation.results.trajectory import Trajectory
     from robot_dyn.simulation.setup.setup import Setup
 
 
@@ -23,6 +24,19 @@ def scene(what: str, given: Mapping[str, object]) -> Setup | None:
     if of_robots := [name for name, value in given.items() if value]:
         raise QueryError(f"{of_robots[0]}: is for a robot; a scene states its own, so leave it out")
     return rd.read_scene(what)
+
+
+def run(path: str) -> Trajectory:
+    """Return the run of a file; QueryError for a batch."""
+    import robot_dyn as rd
+
+    result = rd.read(path)
+    if isinstance(result, rd.Rollouts):
+        raise QueryError(
+            f"{path}: is a batch of {len(result)} runs, and one run is needed; save one of them in Python, for example"
+            f" rd.read({path!r})[0].save('run.npz')"
+        )
+    return result
 
 
 def assignments(option: str, texts: list[str], what: str = "joint") -> dict[str, float]:

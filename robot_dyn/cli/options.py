@@ -143,7 +143,7 @@ class Results:
         """Return the paths to write a figure and a table of a class of results to, checked before the work is done."""
         from robot_dyn.report.figure import ResultError
         from robot_dyn.report.save import table_kind
-        from robot_dyn.view.plots.plots import PICTURES
+        from robot_dyn.view.plots.pictures import PICTURES
 
         if self.dark and not self.output:
             raise QueryError("--dark is of the figure; add --output PLOT.png, or leave it out")
@@ -155,10 +155,8 @@ class Results:
 
     def give(self, result: Any, paths: Iterable[Path], drawn: Any = None, **more: Any) -> None:
         """Write a result, or the one that is `drawn`, and show it with more answers by key."""
-        import robot_dyn as rd
-
         theme = "dark" if self.dark else "light"
-        writes = [partial(rd.accuracy.save_result, drawn or result, path, theme=theme) for path in paths]
+        writes = [partial((drawn or result).save, path, theme=theme) for path in paths]
         show(result, as_json=self.as_json, more=more, writes=writes)
 
 

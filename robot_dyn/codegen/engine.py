@@ -195,8 +195,10 @@ class Engine:
         """Convert an argument to an array; the kernel checks faster that its numbers are finite."""
         if name == "t":
             return times(name, x)[..., None]
-        plain = type(x) is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
-        return x if plain else shaped(name, x, self.joint_names)
+        plain = type(x) is np.ndarray
+        if isinstance(x, np.ndarray) and plain and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),):
+            return x
+        return shaped(name, x, self.joint_names)
 
     def _run(self, quantity: str, inputs: list[np.ndarray], y: np.ndarray) -> Status:
         if len(y) > _FEW:

@@ -36,7 +36,7 @@ _OF_LINK = {"mass": Coefficient("kg", shapes=((),), above=0), "inertia": Coeffic
 _PAYLOAD = {
     "mass": Coefficient("kg", shapes=((),), least=0),
     "com": Coefficient("m", shapes=((3,),)),
-    "inertia": Coefficient("kg m²", shapes=((3, 3),), swept=False),
+    "inertia": Coefficient("kg m²", shapes=((3, 3),), can_vary=False),
 }
 
 
@@ -173,14 +173,14 @@ def link_parameters(dynamics: Dynamics) -> tuple[str, ...]:
     return tuple(f"{link}.{key}" for link in _of_links(robot) for key in _OF_LINK)
 
 
-def sweepable_parameters(
+def variable_parameters(
     dynamics: Dynamics, effects: Iterable[Effect], controller: Controller | None
 ) -> tuple[Parameter, ...]:
     """Return the parameters that may be swept, including those of links and of the controller's models."""
     prefixed = [("", dynamics)]
     prefixed += [(f"{_named(name)}.", model) for name, model in (controller.models if controller else {}).items()]
     swept = [f"{prefix}{name}" for prefix, arm in prefixed for name in (*_WHEN_SWEPT, *link_parameters(arm))]
-    return tuple(x for x in parameters(dynamics, effects, controller, swept) if x.declared.swept)
+    return tuple(x for x in parameters(dynamics, effects, controller, swept) if x.declared.can_vary)
 
 
 def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
@@ -255,7 +255,7 @@ def rows(parameters: Iterable[Parameter], name: str) -> np.ndarray:
 
 
 def with_parameters(
-    plant: Plant, controller: Controller | None, new_values: Mapping[str, Array]
+    plant: Plant, controller: Controller | None, new_values: Mapping[str, ArrayLike]
 ) -> tuple[Plant, Controller | None]:
     """Return a plant and its controller with other values of parameters, each (size,) by name; not checked here."""
     declared_parameters = parameters(plant.dynamics, plant.effects, controller, new_values)

@@ -36,8 +36,8 @@ class CartesianReference(Reference):
     """
 
     position: PiecewisePolynomial
-    rotation: Any = field(default=None, metadata=coefficient(shapes=((3, 3),), swept=False))
-    axis: Any = field(default=(0.0, 0.0, 1.0), metadata=coefficient(shapes=((3,),), swept=False))
+    rotation: Any = field(default=None, metadata=coefficient(shapes=((3, 3),), can_vary=False))
+    axis: Any = field(default=(0.0, 0.0, 1.0), metadata=coefficient(shapes=((3,),), can_vary=False))
     angle: PiecewisePolynomial | None = None
 
     def __post_init__(self) -> None:

@@ -83,9 +83,9 @@ class PID(Controller):
     ki: Any = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
     kd: Any = field(metadata=DAMPING)
     effort_limit: Any = field(default=np.inf, metadata=coefficient("N m", above=0, infinite=True))
-    tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, swept=False))
+    tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, can_vary=False))
     period_s: float = 0.0
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
+    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
 
     def __post_init__(self) -> None:
         super().__post_init__()

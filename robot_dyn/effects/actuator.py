@@ -37,7 +37,7 @@ class EffortLimit(Bound):
         metadata=coefficient("N m", symbol="u_max", least=0, infinite=True, elsewhere=inf, stated="effort_limit")
     )
 
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
+    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
 
     term = "|u| ≤ u_max"
     largest = property(attrgetter("limit"))  # pyright: ignore[reportIncompatibleMethodOverride]

@@ -20,8 +20,8 @@ from robot_dyn.foundations.coefficients import coefficient
 from robot_dyn.foundations.errors import EditError, EffectError
 from robot_dyn.foundations.validate import instance, truth
 
-_START = coefficient("s", shapes=((),), swept=False)
-_END = coefficient("s", shapes=((),), infinite=True, swept=False)
+_START = coefficient("s", shapes=((),), can_vary=False)
+_END = coefficient("s", shapes=((),), infinite=True, can_vary=False)
 
 
 @final

@@ -44,8 +44,8 @@ class DryFriction(SetValued):
     static: Any = field(default=None, metadata=coefficient("N m", symbol="f_s", least=0))
     stribeck_velocity: Any = field(default=None, metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
 
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
-    _direction: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    _direction: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
 
     rubs = True
     term = "−f(v) sign(v); |τ| ≤ f_s at v = 0"

@@ -52,8 +52,8 @@ class RigidBacklash(GearedMotor, SetValued):
     viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
-    _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
 
     coupled: ClassVar[bool] = True
     through = "half_gap"

@@ -40,7 +40,7 @@ class RigidStops(SetValued):
     upper: Any = field(metadata=UPPER)
     restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
 
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
 
     stops = True
     term = "lower ≤ q ≤ upper, v⁺ = −e v⁻"

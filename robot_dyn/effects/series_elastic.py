@@ -60,7 +60,7 @@ class SeriesElastic(GearedMotor, Dissipative):
     half_gap: Any = field(default=None, metadata=coefficient("rad", symbol="β", least=0))
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
-    _side: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    _side: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
 
     through = "stiffness"
     term = "k δ + d δ̇, n² J θ̈ = u − k δ − d δ̇ − b θ̇, δ = θ − q"

@@ -16,7 +16,7 @@ from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.validate import instance, rows
 from robot_dyn.queries.dynamics import Axes, Dynamics
 
-_TIME = coefficient("s", shapes=((),), infinite=True, swept=False)
+_TIME = coefficient("s", shapes=((),), infinite=True, can_vary=False)
 
 
 @final

@@ -54,7 +54,7 @@ class Coefficient:
         infinite: True if ±inf is allowed.
         elsewhere: Value for joints that are not named.
         stated: The attribute of a `Robot` that "urdf" refers to; "" if files do not state this coefficient.
-        swept: True if it may vary from run to run in `rollouts`.
+        can_vary: True if it may vary from run to run in `rollouts`.
     """
 
     unit: str = ""
@@ -65,12 +65,12 @@ class Coefficient:
     infinite: bool = False
     elsewhere: float = 0.0
     stated: str = ""
-    swept: bool = True
+    can_vary: bool = True
 
     def __post_init__(self) -> None:
         for name in ("unit", "symbol", "stated"):
             instance(name, getattr(self, name), str, "give a text, such as 'N m'", error=EffectError)
-        for name in ("infinite", "swept"):
+        for name in ("infinite", "can_vary"):
             truth(name, getattr(self, name), error=EffectError)
         for name in ("least", "above"):
             if getattr(self, name) is not None:
@@ -155,11 +155,11 @@ def coefficient(
     infinite: bool = False,
     elsewhere: float = 0.0,
     stated: str = "",
-    swept: bool = True,
+    can_vary: bool = True,
 ) -> Mapping[str, Coefficient]:
     """Return metadata that declares a dataclass field as a coefficient; for the arguments, see `Coefficient`."""
     form = {"shapes": shapes, "least": least, "above": above, "infinite": infinite}
-    return {_KEY: Coefficient(unit, symbol, **form, elsewhere=elsewhere, stated=stated, swept=swept)}
+    return {_KEY: Coefficient(unit, symbol, **form, elsewhere=elsewhere, stated=stated, can_vary=can_vary)}
 
 
 @cache

@@ -31,6 +31,7 @@ _MOST = 20  # largest ratio of unpacked to packed bytes: zeros would have 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
+Other = TypeVar("Other")
 Axis = int | str | None  # length of an axis: a number; a letter for one length in a file; None for any length
 
 
@@ -156,25 +157,31 @@ class StoredFormat(Generic[Stored]):
         try:
             plain = _without_arrays(self._adapter.dump_python([value], warnings=False)[0], "", arrays)
             arrays[ABOUT] = np.array(json.dumps({"format": self.name, "value": plain}))
-            self._value(dict(arrays))
+            self.value(dict(arrays))
             return save(path, lambda stream: write_arrays(stream, arrays), self.error)
         except (StoreError, TypeError, ValueError) as error:
             raise self.error(f"{path}: cannot be written: {error}; save a value as the library returns it") from None
 
-    def load(self, path: str | Path) -> Stored:
-        """Return the value of a file.
+    def load(self, path: str | Path, *others: StoredFormat[Other]) -> Stored | Other:
+        """Return the value of a file in this format, or in another format of the same kind of file.
 
         Raises:
-            RobotDynError: Of type `error`, if the file is missing, damaged, cut short or of another format.
+            RobotDynError: Of type `error`, if the file is missing, damaged, cut short or of an unknown format.
         """
         with reading(path, self.error, self.remedy) as stream:
             try:
-                return self._value(_read_arrays(stream))
+                arrays = _read_arrays(stream)
+                name = _about(dict(arrays))["format"]
+                return next((form for form in others if form.name == name), self).value(arrays)
             except StoreError as error:
                 raise self.error(f"{path}: cannot be read as {self.kind.name}: {error}; {self.remedy}") from None
 
-    def _value(self, arrays: dict[str, np.ndarray]) -> Stored:
-        """Return the checked value of arrays; the array `about` contains the JSON."""
+    def value(self, arrays: dict[str, np.ndarray]) -> Stored:
+        """Return the checked value of arrays; the array `about` contains the JSON.
+
+        Raises:
+            StoreError: If the arrays are not a value of this format.
+        """
         from pydantic import ValidationError
 
         about = _about(arrays)

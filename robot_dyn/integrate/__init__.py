@@ -1,13 +1,13 @@
-"""Methods for y' = f(t, y), one family a file; they know no robot. `method("RK4")` finds one by name.
+"""Methods for y' = f(t, y), one family per file, independent of robots. `method("RK4")` returns a method by name.
 
     by name            method; `method="RK4"` of `rd.simulate` takes the same names
-    chosen steps       Adaptive: DOP853, Rodas5P or auto, within a tolerance
+    error control      Adaptive: DOP853, Rodas5P or auto, within a tolerance
     fixed steps        ExplicitRungeKutta, SemiImplicitEuler, GaussLegendre
     stiff, fixed steps Rosenbrock
     with impacts       MoreauJean
     to write one       ButcherTableau, RosenbrockTable, Surd: coefficients as data
                        Integrator, PlainMethod: base classes; Stepper, System, RightSide
-    what they return   Solution, Status; IntegrationError
+    results            Solution, Status; IntegrationError
 
 docs/developers/extending.md adds a method step by step; robot_dyn/integrate/README.md lists its files.
 """

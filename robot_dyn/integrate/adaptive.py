@@ -1,4 +1,4 @@
-"""Methods that choose their steps, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853 and Rodas5P.
+"""Methods with step-size control, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853 and Rodas5P.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4–II.6 and II.10; Hairer, Wanner,
 II, 2nd ed., 1996, IV.8]
@@ -10,15 +10,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
 from types import MappingProxyType
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.validate import choice, function, instance, number, numbers, rows
 from robot_dyn.integrate import dop853
-from robot_dyn.integrate.controlled_steps import Status, Steps
+from robot_dyn.integrate.controlled_steps import Between, Status, Steps
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.rosenbrock import RODAS5P_FIXED
 from robot_dyn.integrate.step_control import ControlledStepper, initial_control
@@ -31,14 +32,14 @@ LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding domin
 @final
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution y from t0 to the end of the run, at every time between by the interpolation of the method.
+    """The solution y from t0 to the end of the run, with dense output by the interpolation of the method.
 
     Attributes:
-        times: Ends of the steps, shape (k,), the first is t0.
-        states: y there, shape (k, m).
-        evaluations: Of the rate, those for Jacobians and interpolation included.
-        status: How the run ended.
-        message: A sentence that says the same, with time and remedy if it failed.
+        times: Ends of the steps, shape (k,); the first is t0.
+        states: y at these times, shape (k, m).
+        evaluations: Number of evaluations of the rate, including those for Jacobians and dense output.
+        status: Status at the end of the run.
+        message: Description of the status in a sentence, with time and remedy if the run failed.
     """
 
     times: np.ndarray
@@ -46,14 +47,14 @@ class Solution:
     evaluations: int
     status: Status
     message: str
-    _pieces: tuple[Any, ...] = field(repr=False)
+    _pieces: tuple[Between, ...] = field(repr=False)
 
     def __post_init__(self) -> None:
         self.times.setflags(write=False)
         self.states.setflags(write=False)
 
-    def __call__(self, t: Any) -> np.ndarray:
-        """State at the times t, shape (...,): shape (..., m).
+    def __call__(self, t: ArrayLike) -> np.ndarray:
+        """Return the states (..., m) at the times t, shape (...,).
 
         Raises:
             QueryError: If a time is not within the run.
@@ -74,12 +75,13 @@ class Solution:
 class Adaptive:
     """An integrator with step-size control and dense output, in float64.
 
-    Tolerances bound the error of a step; that of the run is larger by what the system magnifies.
+    Tolerances bound the local error of a step. The global error may be larger, depending on the stability of the
+    system.
 
     Attributes:
-        method: DOP853 (explicit, order 8), Rodas5P (linearly implicit, order 5, L-stable), or auto: a simulation by
-            DOP853 that Rodas5P takes over if stability bounds its steps.
-        rtol: Relative tolerance, 2.3e-14 at least.
+        method: DOP853 (explicit, order 8), Rodas5P (linearly implicit, order 5, L-stable), or auto: a simulation
+            starts with DOP853, and continues with Rodas5P if stability limits the steps.
+        rtol: Relative tolerance, at least 2.3e-14.
         atol: Absolute tolerance, in the unit of y, not negative.
         max_step_s: Longest step, in [s].
 
@@ -99,16 +101,16 @@ class Adaptive:
 
     @property
     def needs_jacobian(self) -> bool:
-        """Whether its steps need ∂f/∂y."""
+        """True if steps need ∂f/∂y."""
         return self.method == STIFF
 
     @property
     def name(self) -> str:
-        """Its name in scene files."""
+        """Name of the method, as in scene files."""
         return self.method
 
     def with_tolerances(self, factor: float, longest_s: float) -> Adaptive:
-        """The same with tolerances times a factor, and steps of at most `longest_s`."""
+        """Return a copy with tolerances multiplied by a factor, and steps of at most `longest_s`."""
         factor = number("factor", factor, above=0)
         return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step_s=longest_s)
 
@@ -136,13 +138,13 @@ class Adaptive:
 
         Args:
             system: The equation y' = f(t, y).
-            t0: Start.
-            y0: State there, shape (m,), float64: balls and longdouble have no adaptive method, batches no common step.
-            t1: End; earlier than t0 to go back.
-            stop: A function of (t, y); the run stops where it first changes sign, if it is given.
+            t0: Initial time.
+            y0: Initial state, shape (m,), float64. Balls, longdouble and batches are not supported.
+            t1: Final time; less than t0 to integrate backwards.
+            stop: Optional function of (t, y); the run stops where it first changes sign.
 
         Returns:
-            The solution up to the end of the run; one that fails has its steps until then, and a status that says so.
+            The solution up to the end of the run. If the run fails, it has the steps until then, and status FAILED.
 
         Raises:
             QueryError: If y0, t0 or t1 is not valid, or the method is auto.
@@ -163,10 +165,10 @@ class Adaptive:
     def steps(
         self, system: System, t0: float, y0: Array, t1: float, stop: Callable[[float, Array], float] | None = None
     ) -> Steps:
-        """The steps from t0 to t1, one at a time; arguments and errors as of `solve`."""
+        """Return an iterator over the steps from t0 to t1; see `solve` for arguments and errors."""
         instance("system", system, System, "give a System(rate, n)")
         if self.method == AUTO:
-            raise QueryError(f"method: simulations choose one for {AUTO!r}; name {EXPLICIT!r} or {STIFF!r} here")
+            raise QueryError(f"method: {AUTO!r} is for simulations only; use {EXPLICIT!r} or {STIFF!r}")
         t0, t1, y0 = number("t0", t0), number("t1", t1), _initial_state(y0)
         if t0 == t1:
             raise QueryError(f"t0 and t1 must differ, got {t0} twice")
@@ -177,7 +179,7 @@ class Adaptive:
         return Steps(stepper, control, system, stop, t0, y0, t1)
 
 
-# Each method for a loop, of (entries of the state, rows of the rate, entries whose error counts).
+# Factories of steppers, by method: functions of (entries of the state, rows of the rate, entries with error control).
 STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType(
     {EXPLICIT: dop853.stepper, STIFF: RODAS5P_FIXED.controlled, AUTO: dop853.stepper}
 )
@@ -185,5 +187,5 @@ STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingPr
 
 def _initial_state(y0: Array) -> np.ndarray:
     if getattr(y0, "dtype", None) in (object, np.longdouble):
-        raise QueryError(f"y0 must be float64 of shape (m,), got {y0.dtype}: adaptive methods work in float64 alone")
+        raise QueryError(f"y0 must be float64 of shape (m,), got {y0.dtype}: adaptive methods support float64 only")
     return np.array(numbers("y0", y0, ("m",)))

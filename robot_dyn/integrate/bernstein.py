@@ -11,14 +11,14 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 
-NONE = 2.0  # instead of a root
-_NARROW = 1e-13  # of a step
-_DEEP = 64  # more halvings are of no use in floats
+NONE = 2.0  # returned without a root
+_NARROW = 1e-13  # of a step: width of an interval that is not divided further
+_MAX_DEPTH = 64  # more halvings are useless in floats
 
 
 def work_array(degree: int) -> np.ndarray:
     """Return the work array of `first_below`."""
-    return np.zeros((_DEEP, degree + 3))
+    return np.zeros((_MAX_DEPTH, degree + 3))
 
 
 def coefficients(start: float, F: Array, e: int, b: Array) -> None:
@@ -59,11 +59,11 @@ def value(b: Array, theta: float) -> float:
 
 
 def first_below(b: Array, slack: float, stack: Array) -> float:
-    """Return the first θ from which a polynomial is below −slack, within rounding; NONE if it never is.
+    """Return the first θ at which a polynomial falls below −slack, within rounding; NONE if it never does.
 
     Args:
-        b: Its coefficients, (d + 1,).
-        slack: Rounding of the coefficients: none above −slack counts as below.
+        b: Coefficients of the polynomial, (d + 1,).
+        slack: Rounding error of the coefficients.
         stack: See `work_array`.
     """
     d, depth = len(b) - 1, 1
@@ -78,7 +78,7 @@ def first_below(b: Array, slack: float, stack: Array) -> float:
         if least >= -slack:
             depth -= 1
             continue
-        if piece[2] < -slack or high - low <= _NARROW or depth == _DEEP:
+        if piece[2] < -slack or high - low <= _NARROW or depth == _MAX_DEPTH:
             return low
         middle, left = (low + high) / 2, stack[depth]  # the right half stays below, the left one comes first
         left[0], left[1] = low, middle

@@ -1,4 +1,4 @@
-"""Steps of controlled error for any System, in Python: by the same functions as those of a run."""
+"""Steps with error control for any `System`, in Python, by the same functions that simulations use."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from enum import Enum
 from typing import Any, cast, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.errors import OverflowedError, RobotDynError, is_mistake
 from robot_dyn.foundations.values import copied
+from robot_dyn.integrate.differences import Rate
 from robot_dyn.integrate.integrator import RightSide, States, System
 from robot_dyn.integrate.primitives import between
 from robot_dyn.integrate.step_control import ControlledStepper, StepControl, chosen_step, first_step
@@ -20,7 +22,7 @@ Stop = Callable[[float, Array], float]
 
 
 class Status(Enum):
-    """How a run ended."""
+    """Status at the end of a run."""
 
     FINISHED = "finished"
     STOPPED = "stopped"
@@ -34,13 +36,13 @@ class _NotFiniteError(Exception):
 
 @final
 class Steps:
-    """The steps of a run, computed one at a time: an iterator over (t, y, piece), with y between the ends of each.
+    """The steps of a run, computed one at a time: an iterator over (t, y, piece) with the polynomial of each step.
 
     Attributes:
-        t, y: Time and state reached.
-        evaluations: Of the rate so far.
-        status: How the run ended, after the last step.
-        message: A sentence that says the same, with time and remedy if it failed.
+        t, y: Current time and state.
+        evaluations: Number of evaluations of the rate so far.
+        status: Status at the end of the run, after the last step.
+        message: Description of the status in a sentence, with time and remedy if the run failed.
     """
 
     def __init__(
@@ -59,25 +61,25 @@ class Steps:
         self._choose = chosen_step(stepper.step, stepper.error)
         counted = System(self._counted(system.rate), system.n, system.widths, system.exact)
 
-        def rate(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
+        def rate(t: float, x: Array, p: Array, run_parameters: Array, out: Array) -> None:
             out[:, 0] = counted.rate(t, x[:, 0].copy())
 
-        def jacobian(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
+        def jacobian(t: float, x: Array, p: Array, run_parameters: Array, out: Array) -> None:
             out[:, :, 0] = counted.derivatives(t, x[:, 0].copy(), t1)
 
         self._f = RightSide(rate, jacobian)
 
-    def _counted(self, rate: Callable[[Any, Array], Array]) -> Callable[[Any, Array], Array]:
-        def counted(t: Any, y: Array) -> Array:
+    def _counted(self, rate: Rate) -> Rate:
+        def counted(t: Scalar, y: Array) -> Array:
             self.evaluations += y.size // y.shape[-1]
             try:
                 return rate(t, y)
-            except OverflowedError:  # a trial step went too far; a shorter one is tried
+            except OverflowedError:  # a trial step was too long; a shorter one is tried
                 return np.full_like(y, np.nan)
 
         return counted
 
-    def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
+    def __iter__(self) -> Iterator[tuple[float, Array, Between]]:
         stepper, t, y = self._stepper, self.t, self.y[:, None].copy()
         self._control = copied(self._first_control)  # a second iteration begins with a first step, too
         failed = np.zeros(1, np.int64)
@@ -91,7 +93,7 @@ class Steps:
                         raise _NotFiniteError
                     piece = self._step(t, x)
                     if piece is None:
-                        self._failed("the step became smaller than the spacing of floats")
+                        self._fail("the step became smaller than the spacing of floats")
                         return
                     t = float(self._control.end[0])
                     stopped = self._take(piece, t, y[:, 0])
@@ -100,7 +102,7 @@ class Steps:
                     self.status, self.message = Status.STOPPED, f"stopped at t = {self.t}"
                     return
         except _NotFiniteError:
-            self._failed("the rate is not finite")
+            self._fail("the rate is not finite")
         except RobotDynError as error:
             if is_mistake(error):
                 raise
@@ -108,7 +110,7 @@ class Steps:
         else:
             self.message = f"finished at t = {self.t}"
 
-    def _step(self, t: float, x: States) -> _Between | None:
+    def _step(self, t: float, x: States) -> Between | None:
         """Advance x.y by a step from t, and return its polynomial; None if every step is too small."""
         stepper, control, end = self._stepper, self._control, self._end
         coefficients, work = stepper.coefficients, stepper.work
@@ -120,17 +122,17 @@ class Steps:
         h = control.h[0]
         stepper.accept(self._f, coefficients, work, t, h, x)
         stepper.dense(self._f, coefficients, work, t, h, x)
-        piece = _Between(t, h, x.y.copy(), work.F.copy())
+        piece = Between(t, h, x.y.copy(), work.F.copy())
         x.y[...] = x.after
         work.K[0] = work.last
         return piece
 
-    def _failed(self, reason: str) -> None:
+    def _fail(self, reason: str) -> None:
         where = f"{reason} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
         self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
 
-    def _take(self, piece: _Between, t: float, y: Array) -> bool:
-        """Advance to t, or to where `stop` changes sign before that; return whether it does."""
+    def _take(self, piece: Between, t: float, y: Array) -> bool:
+        """Advance to t, or to an earlier sign change of `stop`; return True if the run stops."""
         stopped = False
         if self._stop is not None:
             before, after = self._stop(self.t, self.y), self._stop(t, y.copy())
@@ -141,24 +143,24 @@ class Steps:
         self.t, self.y = t, y.copy()
         return stopped
 
-    def _crossing(self, piece: _Between, t0: float, t1: float) -> float:
+    def _crossing(self, piece: Between, t0: float, t1: float) -> float:
         from scipy.optimize import brentq
 
         stop, root = cast(Any, self._stop), cast(Any, brentq)
-        # the ends are states, which interpolation meets up to rounding: the sign must not depend on that
+        # interpolation reaches the states at the ends up to rounding: the sign must not depend on that
         ends = {t0: stop(t0, self.y), t1: -stop(t0, self.y)}
         t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
         return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
 
 
 @final
-class _Between:
+class Between:
     """The polynomial of a step: y (m,) or (m, k) at times within it."""
 
     def __init__(self, t: float, h: float, y: Array, F: Array) -> None:
         self.t, self.h, self.y, self.F = t, h, y, F
 
-    def __call__(self, t: Any) -> Array:
+    def __call__(self, t: ArrayLike) -> Array:
         theta = (np.asarray(t) - self.t) / self.h
         out = np.empty((len(self.y), theta.size))
         for i, fraction in enumerate(theta.flat):

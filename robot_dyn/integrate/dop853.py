@@ -2,9 +2,9 @@
 
     y⁺ = y + h (k₁ + Σ b_j (k_j − k₁)),   ‖e‖ = |h| ‖e₅‖² / √(‖e₅‖² + 0.01 ‖e₃‖²),   dense output of order 7
 
-Stages are stored as differences from the first: Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. One b_j is rounded so
-that Σ b_j c_j is ½ to the last bit, as free fall needs, which would otherwise gain 1e-15 of its energy in each step.
-Three further stages give the dense output where it is needed. The coefficients are SciPy's.
+Stages are stored as differences from the first, because Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. One b_j is
+rounded so that Σ b_j c_j is ½ to the last bit; free fall would otherwise gain 1e-15 of its energy in each step. Three
+further stages give the dense output where it is needed. The coefficients are SciPy's.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5, II.6 and II.10]
 """
@@ -17,14 +17,17 @@ from importlib.util import find_spec
 from pathlib import Path
 from runpy import run_path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
 from robot_dyn.integrate.step_control import ControlledStepper
+
+if TYPE_CHECKING:
+    from scipy.integrate import DOP853
 
 _STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
 
@@ -33,7 +36,7 @@ class Coefficients(NamedTuple):
     """Coefficients for differences of the stages.
 
     Attributes:
-        a, b, c: Of all 16 stages, (16, 16), (12,) and (16,).
+        a, b, c: Coefficients of all 16 stages, (16, 16), (12,) and (16,).
         e3, e5: Weights of the error estimates, (12,).
         d: Weights of the dense output, (4, 16).
         end: Weights that select the rate at the end, (13,).
@@ -52,11 +55,11 @@ class Work(NamedTuple):
     """The arrays of a step.
 
     Attributes:
-        K: k₁, and k_j − k₁ of the others, (16, r, 1).
-        last: The rate at its end, (r, 1).
+        K: k₁, and k_j − k₁ for j > 1, (16, r, 1).
+        last: The rate at the end of the step, (r, 1).
         F: Dense output, (7, m, 1), see `between`.
-        error: (2, k, 1), of the first entries of y, whose error is bounded.
-        zero: (m, 1).
+        error: Error estimates of orders 5 and 3 for the first k entries of y, which are controlled, (2, k, 1).
+        zero: Zeros, (m, 1).
     """
 
     K: Array
@@ -69,17 +72,17 @@ class Work(NamedTuple):
 @cache
 def coefficients() -> Coefficients:
     """Return SciPy's coefficients for differences of the stages."""
-    DOP853 = table()
+    scipy = table()
     a = np.zeros((_EXTENDED, _EXTENDED))
-    a[:_STAGES, :_STAGES], a[_STAGES + 1 :] = DOP853.A, DOP853.A_EXTRA
-    a[_STAGES, :_STAGES] = DOP853.B
-    c = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
+    a[:_STAGES, :_STAGES], a[_STAGES + 1 :] = scipy.A, scipy.A_EXTRA
+    a[_STAGES, :_STAGES] = scipy.B
+    c = np.concatenate([scipy.C, [1.0], scipy.C_EXTRA])
     a[:, 0] = c  # Σ_j a_ij = c_i, so this is the weight of k₁
-    b, d, e3, e5 = (np.array(x) for x in (DOP853.B, DOP853.D, DOP853.E3[:_STAGES], DOP853.E5[:_STAGES]))
+    b, d, e3, e5 = (np.array(x) for x in (scipy.B, scipy.D, scipy.E3[:_STAGES], scipy.E5[:_STAGES]))
     b[0], d[:, 0], e3[0], e5[0] = 1.0, 0.0, 0.0, 0.0
-    least = int(np.flatnonzero(b)[np.argmin(np.abs(b[b != 0]))])  # the one that is rounded most finely
-    b[least] += float(
-        (Fraction(1, 2) - sum(Fraction(x) * Fraction(y) for x, y in zip(b, c, strict=False))) / Fraction(c[least])
+    smallest = int(np.flatnonzero(b)[np.argmin(np.abs(b[b != 0]))])  # its spacing of floats is the finest
+    b[smallest] += float(
+        (Fraction(1, 2) - sum(Fraction(x) * Fraction(y) for x, y in zip(b, c, strict=False))) / Fraction(c[smallest])
     )
     a[_STAGES, 1:_STAGES] = b[1:]
     end = np.zeros(_STAGES + 1)
@@ -87,8 +90,8 @@ def coefficients() -> Coefficients:
     return Coefficients(a=a, b=b, c=c, e3=e3, e5=e5, d=d, end=end)
 
 
-def table() -> Any:
-    """Return SciPy's table from its file: to import `scipy.integrate` takes longer than to load machine code."""
+def table() -> SimpleNamespace | type[DOP853]:
+    """Return SciPy's table, read from its file, because importing `scipy.integrate` is slower than machine code."""
     package = find_spec("scipy")
     try:
         assert package is not None
@@ -105,7 +108,7 @@ def table() -> Any:
 
 
 def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
-    """Return the method for one state of m entries, rates of `rows`, and errors of the first `bounded` entries."""
+    """Return the method for one state of m entries, with `rows` entries of a rate and `bounded` entries of an error."""
     work = Work(
         K=np.zeros((_EXTENDED, rows, 1)),
         last=np.zeros((rows, 1)),
@@ -119,7 +122,7 @@ def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
     )
 
 
-def step(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -> int:
+def step(f: RightSide, c: Coefficients, work: Work, t: Scalar, h: Scalar, x: States) -> int:
     """Take a trial step; see `ControlledStepper`."""
     y, after, p, run_parameters, K = x.y, x.after, x.p, x.run_parameters, work.K
     x.failed[0] = 0
@@ -131,8 +134,8 @@ def step(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -
     return _STAGES - 1
 
 
-def error(c: Coefficients, work: Work, h: Any, x: States, rtol: float, atol: float) -> float:
-    """Return the norm of the error of a trial step; see `ControlledStepper`."""
+def error(c: Coefficients, work: Work, h: Scalar, x: States, rtol: float, atol: float) -> float:
+    """Return the norm of the local error of a trial step; see `ControlledStepper`."""
     y, after, fifth, third = x.y, x.after, work.error[0], work.error[1]
     k = len(fifth)
     combination(fifth, work.zero[:k], 1.0, c.e5, work.K, _STAGES)
@@ -143,7 +146,7 @@ def error(c: Coefficients, work: Work, h: Any, x: States, rtol: float, atol: flo
     return abs(h) * large * large / np.sqrt(large * large + 0.01 * small * small)
 
 
-def dense(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -> int:
+def dense(f: RightSide, c: Coefficients, work: Work, t: Scalar, h: Scalar, x: States) -> int:
     """Compute the dense output, from three further stages; see `ControlledStepper`."""
     F, K = work.F, work.K
     copy(K[_STAGES], work.last)

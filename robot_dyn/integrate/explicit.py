@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
-from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Scalar
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.dop853 import table
@@ -27,7 +27,7 @@ class Stages(NamedTuple):
     K: Array
 
 
-def explicit_step(f: RightSide, tableau: Coefficients, work: Stages, t: Any, h: Any, x: States) -> int:
+def explicit_step(f: RightSide, tableau: Coefficients, work: Stages, t: Scalar, h: Scalar, x: States) -> int:
     """Take a step of an explicit Runge–Kutta method; see `Stepper` for the arguments."""
     y, after, p, run_parameters, K, s = x.y, x.after, x.p, x.run_parameters, work.K, len(tableau.c)
     evaluate(f.rate, t, y, p, run_parameters, K[0])
@@ -43,7 +43,7 @@ def explicit_step(f: RightSide, tableau: Coefficients, work: Stages, t: Any, h: 
 class ExplicitRungeKutta(PlainMethod):
     """The explicit Runge–Kutta method of a tableau, in float, longdouble or balls.
 
-    In balls it encloses the exact result of the step, not the flow.
+    In balls the result encloses the exact result of the step, not the flow.
 
     Raises:
         QueryError: If a stage of the tableau needs itself or a later one.
@@ -56,7 +56,7 @@ class ExplicitRungeKutta(PlainMethod):
 
     def __post_init__(self) -> None:
         if not self.tableau.explicit or float(self.tableau.c[0]) != 0:
-            raise QueryError(f"{self.name}: a tableau of an explicit method has i entries at most in row i")
+            raise QueryError(f"{self.name}: row i of the tableau of an explicit method may have up to i entries")
         object.__setattr__(self, "order", self.tableau.order)
         object.__setattr__(self, "evaluations_per_step", len(self.tableau.b))
 
@@ -74,7 +74,7 @@ class Start(NamedTuple):
     b: Array
 
 
-def semi_implicit_step(f: RightSide, start: Start, work: Stages, t: Any, h: Any, x: States) -> int:
+def semi_implicit_step(f: RightSide, start: Start, work: Stages, t: Scalar, h: Scalar, x: States) -> int:
     """Take a step of semi-implicit Euler; see `Stepper` for the arguments."""
     n, y, after = start.n, x.y, x.after
     evaluate(f.rate, t, y, x.p, x.run_parameters, work.K[0])
@@ -88,9 +88,9 @@ def semi_implicit_step(f: RightSide, start: Start, work: Stages, t: Any, h: Any,
 class SemiImplicitEuler(PlainMethod):
     """Euler's method with the new velocity in the position: v⁺ = v + h a(t, q, v), then q⁺ = q + h v⁺.
 
-    Needs y = (q, v, quadratures) with q' = v; quadratures advance with the explicit rate. It is symplectic for a
-    constant mass matrix and forces that do not depend on v (Störmer and Verlet's relative) and is NOT symplectic here:
-    the M of a robot arm depends on q, and (q, v) are not canonical coordinates.
+    The state must be y = (q, v, quadratures) with q' = v; quadratures advance with the explicit rate. The method is
+    symplectic for a constant mass matrix and forces that do not depend on v, like the Störmer–Verlet method. It is not
+    symplectic for robot arms, because M depends on q, and (q, v) are not canonical coordinates.
 
     Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, I.1.2 and VI.3.
     """
@@ -129,12 +129,10 @@ RK4 = ExplicitRungeKutta(
 def dp8() -> ExplicitRungeKutta:
     """Return the method of order 8 with 12 stages of Dormand and Prince, at a fixed step.
 
-    Its coefficients are SciPy's, rounded to float64: in longdouble they bound the accuracy of a step to some 1e-16 h.
+    The coefficients are SciPy's, rounded to float64. In longdouble they limit the accuracy of a step to about 1e-16 h.
 
     Source: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5 and II.10.
     """
-    DOP853 = table()
-    a = tuple(tuple(map(float, row[:i])) for i, row in enumerate(DOP853.A))
-    return ExplicitRungeKutta(
-        "DP8", ButcherTableau(a, tuple(map(float, DOP853.B)), tuple(map(float, DOP853.C)), order=8)
-    )
+    scipy = table()
+    a = tuple(tuple(map(float, row[:i])) for i, row in enumerate(scipy.A))
+    return ExplicitRungeKutta("DP8", ButcherTableau(a, tuple(map(float, scipy.B)), tuple(map(float, scipy.C)), order=8))

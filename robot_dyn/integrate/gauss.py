@@ -2,9 +2,9 @@
 
     k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ_i b_i k_i,    Pₛ(2 c_i − 1) = 0
 
-They keep every quadratic invariant, and the energy of a Hamiltonian system in (q, p) up to a bounded O(h²ˢ).
-The iteration for the stages is continued until rounding ends it: an earlier end is a systematic error, and energy
-drifts. [Hairer, Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, IV.2.1, VI.4 and VIII.6]
+They preserve every quadratic invariant, and the energy of a Hamiltonian system in (q, p) up to a bounded O(h²ˢ). The
+stage iteration continues until rounding dominates: an earlier end is a systematic error, and energy drifts. [Hairer,
+Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, IV.2.1, VI.4 and VIII.6]
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, ClassVar, NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Arithmetic, Array, midpoint, radius
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Scalar, midpoint, radius
 from robot_dyn.foundations.errors import OverflowedError, QueryError
 from robot_dyn.foundations.validate import integer
 from robot_dyn.foundations.values import aligned
@@ -78,7 +78,7 @@ class Increments(NamedTuple):
     epsilon: float
 
 
-def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Any, h: Any, x: States) -> int:
+def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Scalar, h: Scalar, x: States) -> int:
     """Take a step of a Gauss method; see `Stepper` for the arguments."""
     y, after, Z, m, s = x.y, x.after, work.Z, len(x.y), len(tableau.c)
     Z[...] = tableau.zero
@@ -100,17 +100,17 @@ def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Any, h:
 @final
 @dataclass(frozen=True)
 class GaussLegendre(PlainMethod):
-    """Gauss–Legendre collocation of order 2, 4 or 6, its stages solved by fixed-point iteration until rounding ends it.
+    """Gauss–Legendre collocation of order 2, 4 or 6, with stages solved to rounding by fixed-point iteration.
 
-    The iteration converges where h is small against the fastest motion, h L ‖A‖ < 1 with L the Lipschitz constant of f,
-    and may take MOST_ITERATIONS (100) rounds: the method is A-stable, but this iteration is not for stiff
-    systems. In balls the step holds an exact solution of the stage equations, proven by Brouwer's theorem.
+    The iteration converges if h is short compared with the fastest motion: h L ‖A‖ < 1, with the Lipschitz constant L
+    of f. It may take up to MOST_ITERATIONS (100) rounds. The method is A-stable, but this iteration does not suit stiff
+    systems. In balls the step contains an exact solution of the stage equations, proven by Brouwer's theorem.
 
     Attributes:
-        order: 2, 4 or 6.
+        order: Order of the method, 2, 4 or 6.
 
     Raises:
-        QueryError: If the order is another.
+        QueryError: If the order is not 2, 4 or 6.
     """
 
     order: int
@@ -120,12 +120,12 @@ class GaussLegendre(PlainMethod):
 
     def __post_init__(self) -> None:
         if integer("order", self.order) not in _TABLEAUS:
-            raise QueryError(f"no Gauss method of order {self.order!r}: give 2, 4 or 6")
+            raise QueryError(f"order of a Gauss method must be 2, 4 or 6, got {self.order!r}")
         object.__setattr__(self, "name", f"GaussLegendre{self.order}")
 
     @property
     def tableau(self) -> ButcherTableau:
-        """Its coefficients."""
+        """Coefficients of the method."""
         return _TABLEAUS[self.order]
 
     def stepper(
@@ -138,7 +138,7 @@ class GaussLegendre(PlainMethod):
         work = Increments(K=K, Z=Z, new=new, least=least, stale=stale, state=state, epsilon=epsilon)
         return Stepper(gauss_step, self.tableau.arrays(kind), work)
 
-    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
+    def step(self, system: System, t: Scalar, y: Array, h: Scalar) -> Array:
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # an iteration that diverges is reported
                 after, failed, work = self.stepped(system, t, y, h)
@@ -148,8 +148,8 @@ class GaussLegendre(PlainMethod):
             raise self.not_found(t, h)
         return after if y.dtype != object else self._enclosed(system, t, y, h, work.Z)
 
-    def _enclosed(self, system: System, t: Any, y: Array, h: Any, Z: Array) -> Array:
-        """Return the step in balls, from approximate increments (s, m, B), around which a solution lies."""
+    def _enclosed(self, system: System, t: Scalar, y: Array, h: Scalar, Z: Array) -> Array:
+        """Return the step in balls, from approximate increments (s, m, B) near a solution."""
         kind = arithmetic_like(y)
         a, b, c, *_ = self.tableau.arrays(kind)
         h, times = kind.number(h), [t + node * kind.number(h) for node in c]
@@ -162,19 +162,19 @@ class GaussLegendre(PlainMethod):
             raise self.not_found(t, h)
         return y + combine(b, x)
 
-    def not_found(self, t: Any, h: Any) -> IntegrationError:
+    def not_found(self, t: Scalar, h: Scalar) -> IntegrationError:
         return IntegrationError(
             f"{self.name}: the stages of the step {float(h)} at t = {float(t)} do not converge in "
-            f"{MOST_ITERATIONS} iterations: take a smaller step, or a method for stiff systems",
+            f"{MOST_ITERATIONS} iterations: use a smaller step, or a method for stiff systems",
             t,
         )
 
 
 def enclose_fixed_point(update: Callable[[Array], Array], x: Array) -> Array | None:
-    """Return balls that certainly contain a fixed point of Φ, near an approximate one.
+    """Return balls that are proven to contain a fixed point of Φ, near an approximate one.
 
-    The stages of a step are such a point. A box that Φ maps into its interior contains a fixed point, by Brouwer's
-    theorem; so does every further image.
+    The stages of a step are a fixed point. A box that Φ maps into its interior contains a fixed point, by Brouwer's
+    theorem, and every further image of the box contains it too.
 
     Args:
         update: Φ, in balls.
@@ -187,9 +187,9 @@ def enclose_fixed_point(update: Callable[[Array], Array], x: Array) -> Array | N
     """
     box = update(x)
     for _ in range(MOST_ITERATIONS):
-        wide = _inflate(box)
-        box = update(wide)
-        if all(outer.contains_interior(inner) for outer, inner in zip(wide.flat, box.flat, strict=True)):
+        inflated = _inflate(box)
+        box = update(inflated)
+        if all(outer.contains_interior(inner) for outer, inner in zip(inflated.flat, box.flat, strict=True)):
             break
     else:
         return None
@@ -212,11 +212,11 @@ def _inflate(box: Array) -> Array:
 
 
 def _sizes(x: Array) -> np.ndarray:
-    """Largest absolute value of each entry over stages and batch, shape (m,)."""
+    """Return the largest absolute value of each entry over stages and batch, shape (m,)."""
     return np.abs(x if x.dtype != object else midpoint(x)).reshape(-1, x.shape[-1]).max(axis=0)
 
 
-def unit_roundoff(x: Array) -> Any:
+def unit_roundoff(x: Array) -> float | np.floating:
     """Return the unit roundoff of the arithmetic of an array."""
     if x.dtype != object:
         return np.finfo(x.dtype).eps

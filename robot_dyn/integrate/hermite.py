@@ -1,9 +1,9 @@
-"""Methods of fixed step prepared for a loop that ends steps at events: with dense output by Hermite's cubic.
+"""Fixed-step methods prepared for a loop that ends steps at events, with dense output by the cubic Hermite polynomial.
 
     y(t + θ h) ≈ y + θ (Δ + (1 − θ) (h f − Δ + θ (2 Δ − h (f + f⁺)))),   Δ = y⁺ − y
 
-It only brackets an event; the step that ends there is the method's own. [Hairer, Nørsett, Wanner, Solving Ordinary
-Differential Equations I, 2nd ed., 1993, II.6, (6.7)]
+The polynomial only brackets an event; the method itself takes the step that ends there. [Hairer, Nørsett, Wanner,
+Solving Ordinary Differential Equations I, 2nd ed., 1993, II.6, (6.7)]
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import FLOAT64, Array
+from robot_dyn.foundations.arithmetic import FLOAT64, Array, Scalar
 from robot_dyn.integrate.integrator import Integrator, RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, subtract
 from robot_dyn.integrate.step_control import ControlledStepper
@@ -33,11 +33,11 @@ class Work(NamedTuple):
 
     Attributes:
         method: Arrays of the method.
-        K: The rate at the start, and one at the end, (2, r, 1).
+        K: The rates at the start and at the end, (2, r, 1).
         last: The rate at the end, (r, 1).
         F: Dense output, (3, m, 1), see `between`.
         error: Empty, (0, m, 1).
-        zero: (m, 1).
+        zero: Zeros, (m, 1).
     """
 
     method: Any
@@ -49,7 +49,7 @@ class Work(NamedTuple):
 
 
 def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None) -> ControlledStepper:
-    """Return a method of fixed step for one state of m entries, n of them positions, and rates of `rows`."""
+    """Return a fixed-step method for one state of m entries, n of them positions, and rates of `rows` entries."""
     inner = method.stepper(FLOAT64, m, n, rows, 1, widths)
     work = Work(
         method=inner.work,
@@ -66,7 +66,7 @@ def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None)
 def step_of(inner: Callable[..., int]) -> Callable[..., int]:
     """Return the step of a method whose coefficients and arrays are fields of `Numbers` and `Work`."""
 
-    def step(f: RightSide, c: Numbers, work: Work, t: Any, h: Any, x: States) -> int:
+    def step(f: RightSide, c: Numbers, work: Work, t: Scalar, h: Scalar, x: States) -> int:
         x.failed[0] = 0
         return inner(f, c.method, work.method, t, h, x)
 
@@ -76,13 +76,13 @@ def step_of(inner: Callable[..., int]) -> Callable[..., int]:
 _cached_step = cache(step_of)  # machine code is built once for each function
 
 
-def no_error(c: Numbers, work: Work, h: Any, x: States, rtol: float, atol: float) -> float:
-    """Return 0: a method of fixed step has no error estimate."""
+def no_error(c: Numbers, work: Work, h: Scalar, x: States, rtol: float, atol: float) -> float:
+    """Return 0: a fixed-step method has no error estimate."""
     return 0.0
 
 
-def dense(f: RightSide, c: Numbers, work: Work, t: Any, h: Any, x: States) -> int:
-    """Compute the cubic."""
+def dense(f: RightSide, c: Numbers, work: Work, t: Scalar, h: Scalar, x: States) -> int:
+    """Compute the cubic Hermite polynomial of a step; see `ControlledStepper`."""
     F = work.F
     copy(work.K[1], work.last)
     copy(F[0], x.after)

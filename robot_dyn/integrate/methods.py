@@ -52,7 +52,7 @@ def method(name: str) -> Any:
     return METHODS[choice("integration method", name, METHODS)]()
 
 
-def as_method(value: Any) -> Integrator | Adaptive:
+def as_method(value: object) -> Integrator | Adaptive:
     """Return the method for a name; a method is returned unchanged.
 
     Raises:

@@ -1,20 +1,20 @@
-"""Rosenbrock methods: one matrix a step, one linear system a stage, no iteration.
+"""Rosenbrock methods: one matrix per step, one linear system per stage, no iteration.
 
     (1 − h γ J) u_i = h γ f(t + α_i h, y + Σ_{j<i} a_ij u_j) + γ Σ_{j<i} c_ij u_j + γ γ_i h² ∂f/∂t
     y⁺ = y + Σ_i m_i u_i,   y(t + θ h) = y + θ (y⁺ − y) + θ (1 − θ) Σ_i (h_0i + θ (h_1i + θ h_2i)) u_i
 
-with J = ∂f/∂y and ∂f/∂t at (t, y); y⁺ without its last u_i is of an order less. [Hairer, Wanner, Solving Ordinary
-Differential Equations II, 2nd ed., 1996, IV.7, (7.25)]
+with J = ∂f/∂y and ∂f/∂t at (t, y). Without its last u_i, y⁺ is the embedded method of one order less. [Hairer, Wanner,
+Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.7, (7.25)]
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
+from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array, Scalar
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, States, Stepper
@@ -31,8 +31,8 @@ class Linear(NamedTuple):
         last: The latest f, (r, W).
         U: u_i, (s, m, W).
         J: ∂f/∂y_j for each j, then ∂f/∂t, (m + 1, m, W).
-        A, rows: Factors of 1 − h γ J, (m, m, W), and the rows that they exchange, (m, W).
-        rhs, zero: Right-hand side of a linear system, and 0, (m, W).
+        A, rows: Factors of 1 − h γ J, (m, m, W), and the row exchanges, (m, W).
+        rhs, zero: Right-hand side of a linear system, and zeros, (m, W).
         t_J, y_J: Time and state of J, (1,) and (m, W).
         F: Dense output of one run, (4, m, W), see `between`.
         error: Local error of the entries whose error is bounded, (1, k, W).
@@ -52,22 +52,22 @@ class Linear(NamedTuple):
     error: Array
 
 
-def begin(f: RightSide, table: Numbers, work: Linear, t: Any, x: States) -> int:
-    """Evaluate f and its derivatives, which depend on t and y alone."""
+def begin(f: RightSide, table: Numbers, work: Linear, t: Scalar, x: States) -> int:
+    """Evaluate f and its derivatives, which depend only on t and y."""
     evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
     differentiate(f, work, t, x)
     return 1
 
 
-def differentiate(f: RightSide, work: Linear, t: Any, x: States) -> None:
+def differentiate(f: RightSide, work: Linear, t: Scalar, x: States) -> None:
     """Evaluate the derivatives at t and y."""
     evaluate(f.jacobian, t, x.y, x.p, x.run_parameters, work.J)
     work.t_J[0] = t
     copy(work.y_J, x.y)
 
 
-def stages(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
-    """Take the step, from these derivatives."""
+def stages(f: RightSide, table: Numbers, work: Linear, t: Scalar, h: Scalar, x: States) -> int:
+    """Take the step with these derivatives."""
     K, U, h_gamma = work.K, work.U, h * table.gamma
     y, after, p, run_parameters = x.y, x.after, x.p, x.run_parameters
     factor(work.A, work.J, h_gamma, work.rows, x.failed)
@@ -83,14 +83,14 @@ def stages(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States
     return len(table.m) - 1
 
 
-def rosenbrock_step(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
+def rosenbrock_step(f: RightSide, table: Numbers, work: Linear, t: Scalar, h: Scalar, x: States) -> int:
     """Take a step of a Rosenbrock method; see `Stepper` for the arguments."""
     first = begin(f, table, work, t, x)
     return first + stages(f, table, work, t, h, x)
 
 
-def trial(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
-    """Take a trial step, with the derivatives of `begin` where t and y are the same; see `ControlledStepper`."""
+def trial(f: RightSide, table: Numbers, work: Linear, t: Scalar, h: Scalar, x: States) -> int:
+    """Take a trial step; reuse the derivatives if t and y are unchanged; see `ControlledStepper`."""
     is_current = work.t_J[0] == t
     for e in range(len(x.y)):
         is_current &= work.y_J[e, 0] == x.y[e, 0]
@@ -99,13 +99,13 @@ def trial(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States)
     return stages(f, table, work, t, h, x)
 
 
-def error(table: Numbers, work: Linear, h: Any, x: States, rtol: float, atol: float) -> float:
-    """Return the norm of the last u_i, which the method of lower order lacks; see `ControlledStepper`."""
+def error(table: Numbers, work: Linear, h: Scalar, x: States, rtol: float, atol: float) -> float:
+    """Return the norm of the last u_i, the difference from the embedded method; see `ControlledStepper`."""
     k = work.error.shape[1]
     return norm(work.U[len(work.U) - 1][:k], x.y[:k], x.after[:k], rtol, atol)
 
 
-def dense(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
+def dense(f: RightSide, table: Numbers, work: Linear, t: Scalar, h: Scalar, x: States) -> int:
     """Compute the dense output; see `ControlledStepper`."""
     F = work.F
     copy(F[0], x.after)
@@ -120,9 +120,9 @@ def dense(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States)
 class Rosenbrock(PlainMethod):
     """The Rosenbrock method of a table, in floats.
 
-    J is that of the start of a step: where the rate bends within a step, as regularised dry friction does when a joint
-    comes to rest, the step does not account for the bend, and v chatters about 0 by h |a|. The
-    order rests on an exact J, which machine code has; differences err by u^(2/3) = 4e-11 of it.
+    J is evaluated at the start of a step. If the rate bends within the step, as regularised dry friction does when a
+    joint comes to rest, the step does not account for the bend, and v chatters about 0 by h |a|. The full order needs
+    an exact J, as machine code computes it; the relative error of differences is u^(2/3) = 4e-11.
     """
 
     name: str
@@ -140,13 +140,11 @@ class Rosenbrock(PlainMethod):
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
         if kind.dtype == object:
-            raise QueryError(
-                f"{self.name} works in floats, not in balls: convert y, or take an explicit or a Gauss method"
-            )
+            raise QueryError(f"{self.name} supports floats, not balls; convert y, or use an explicit or a Gauss method")
         return Stepper(rosenbrock_step, self.table.numbers(kind, m), self._work(kind, m, rows, runs, m))
 
     def controlled(self, m: int, rows: int, bounded: int) -> ControlledStepper:
-        """Return the method with control of its error, for the arguments of `dop853.stepper`."""
+        """Return the method with error control; see `dop853.stepper` for the arguments."""
         c, work = self.table.numbers(FLOAT64, m), self._work(FLOAT64, m, rows, 1, bounded)
         return ControlledStepper(
             step=trial, error=error, dense=dense, coefficients=c, work=work, error_order=self.order, begin=begin
@@ -172,9 +170,9 @@ class Rosenbrock(PlainMethod):
             error=error,
         )
 
-    def not_found(self, t: Any, h: Any) -> IntegrationError:
+    def not_found(self, t: Scalar, h: Scalar) -> IntegrationError:
         return IntegrationError(
-            f"{self.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: take a smaller step", t
+            f"{self.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: use a smaller step", t
         )
 
 

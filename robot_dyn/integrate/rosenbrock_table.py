@@ -1,4 +1,4 @@
-"""The coefficients of Rosenbrock methods as data, and those of Rodas5P.
+"""Coefficients of Rosenbrock methods as data, and the coefficients of Rodas5P.
 
 [Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.7, (7.25)]
 """
@@ -25,7 +25,7 @@ class Numbers(NamedTuple):
         f: Weights of f at the start, of h ∂f/∂t, and of the latest f, for each stage, (s, 3).
         dense: Weights of the dense output, (3, s), see `between`.
         gamma, one: γ and 1.
-        last: The weights that select ∂f/∂t of the m + 1 derivatives, (m + 1,).
+        last: Weights that select ∂f/∂t among the m + 1 derivatives, (m + 1,).
     """
 
     a: Array
@@ -42,16 +42,16 @@ class Numbers(NamedTuple):
 @final
 @dataclass(frozen=True)
 class RosenbrockTable:
-    """Coefficients of a Rosenbrock method, for the u_i in place of the k_i: no product with J is needed.
+    """Coefficients of a Rosenbrock method in the form with u_i instead of k_i, which needs no product with J.
 
     Attributes:
         gamma: γ = γ_ii.
-        a, c: One row a stage, of the entries before it.
+        a, c: Coefficients of earlier stages, one row per stage.
         m: Weights.
         alpha: α_i, the time of each stage.
         gammas: γ_i = Σ_j γ_ij, the weights of ∂f/∂t.
-        dense: h_0, h_1, h_2, weights of the polynomial between.
-        order: As in the source; its conditions are checked in the tests.
+        dense: h_0, h_1, h_2, weights of the dense output.
+        order: Order stated by the source; the tests check its conditions.
     """
 
     gamma: float
@@ -79,8 +79,8 @@ class RosenbrockTable:
 
 _FIFTH = (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946)
 
-# Rodas5P: eight stages, stiffly accurate, R(∞) = 0, dense output of order 4; stiffness reduces its order less than that
-# of its relatives.
+# Rodas5P: eight stages, stiffly accurate, R(∞) = 0, dense output of order 4; its order reduction for stiff problems is
+# smaller than in related methods.
 # Steinebach, Construction of Rosenbrock–Wanner method Rodas5P and numerical benchmarks within the Julia Differential
 # Equations package, BIT Numerical Mathematics 63, 2023
 RODAS5P = RosenbrockTable(

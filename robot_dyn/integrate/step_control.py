@@ -1,6 +1,6 @@
-"""Control of the step: the longest one whose local error is within the tolerance, by a PI controller.
+"""Step-size control by a PI controller: the longest step with a local error within the tolerance.
 
-    ‖e‖ ≤ 1,   h⁺ = h · 0.9 ‖e‖^(−α) ‖e₋‖^β,   e the local error over atol + rtol |y|, e₋ that of the step before
+    ‖e‖ ≤ 1,   h⁺ = h · 0.9 ‖e‖^(−α) ‖e₋‖^β,   e the local error over atol + rtol |y|, e₋ of the previous step
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4; Hairer, Wanner, II, 2nd ed.,
 1996, IV.2; Gustafsson 1991]
@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
 
 _BETA_ORDER = 0.2  # β times the order of the error: the weight of the previous error in the next step
-_SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # of a new step
-_NOT_FINITE = 0.1  # factor of a step whose error is not a number
-_STRETCH = 1.01  # to avoid a sliver of a step before the end
-_SPACINGS = 4  # of floats at t: the least step
+_SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # safety factor, and limits of the factor of a new step
+_NOT_FINITE = 0.1  # factor of a step whose error is not finite
+_STRETCH = 1.01  # a step is stretched to the end, to avoid a tiny last step
+_SPACINGS = 4  # of floats at t: the shortest step
 _ONE, _NO_MESH = np.ones(1), np.zeros(0)
 
 
@@ -32,12 +32,12 @@ class StepControl(NamedTuple):
     Attributes:
         next_h: Length of the next step, not negative; 0 before the first.
         h: The latest step, with its sign.
-        end: Time at which it ends.
-        error: ‖e₋‖.
+        end: End of the latest step.
+        error: ‖e₋‖, limited from below.
         rejected: Number of rejected steps.
         mesh_index: Index of the next time of the mesh.
-        mesh: Times at which steps end, (k,), which error control may divide further; (0,) for none.
-        rtol, atol: Tolerances, both 0 for steps that only the mesh determines.
+        mesh: Times at which steps must end, (k,); error control may add others. (0,) for none.
+        rtol, atol: Tolerances, both 0 if only the mesh determines the steps.
         longest: Longest step.
         exponent: 1 over the order of ‖e‖ in h.
     """
@@ -55,32 +55,33 @@ class StepControl(NamedTuple):
     exponent: float
 
 
-def rate_at_start(f: RightSide, c: Any, work: Any, t: Any, x: States) -> int:
-    """Write the rate into work.K[0]: the `begin` of a method that needs nothing else."""
+def rate_at_start(f: RightSide, c: Any, work: Any, t: Scalar, x: States) -> int:
+    """Write the rate into work.K[0]; the `begin` of a method without further terms."""
     evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
     return 1
 
 
-def rate_at_end(f: RightSide, c: Any, work: Any, t: Any, h: Any, x: States) -> int:
-    """Write the rate at the end of a step into work.last: the `accept` of every method here."""
+def rate_at_end(f: RightSide, c: Any, work: Any, t: Scalar, h: Scalar, x: States) -> int:
+    """Write the rate at the end of a step into work.last; the `accept` of every method in this package."""
     evaluate(f.rate, t + h, x.after, x.p, x.run_parameters, work.last)
     return 1
 
 
 class ControlledStepper(NamedTuple):
-    """A method prepared for steps of controlled error, for one state (m, 1).
+    """A method prepared for steps with error control, for one state (m, 1).
 
-    Functions are plain; f has the functions of a `RightSide`, c are the coefficients, x the arrays of `States`.
+    Functions are plain; f has the functions of a `RightSide`, c are the coefficients, x has the arrays of `States`.
 
     Attributes:
-        step: (f, c, work, t, h, x) → evaluations. A trial: writes y(t + h) into x.after.
+        step: (f, c, work, t, h, x) → evaluations. It takes a trial step: it writes y(t + h) into x.after.
         error: (c, work, h, x, rtol, atol) → ‖e‖.
-        dense: (f, c, work, t, h, x) → evaluations. work.F, (d, m, 1), is the polynomial of `between`.
-        coefficients: Numbers of the method, c.
-        work: Arrays of the method; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
+        dense: (f, c, work, t, h, x) → evaluations. It writes the polynomial of `between` into work.F, (d, m, 1).
+        coefficients: Coefficients c of the method.
+        work: Work arrays; work.error, (…, k, 1), has the first k entries of y, whose error is controlled.
         error_order: Order of ‖e‖ in h.
-        begin: (f, c, work, t, x) → evaluations. Terms that depend on (t, y) alone: work.K[0], (r, 1), is the rate.
-        accept: (f, c, work, t, h, x) → evaluations. work.last, (r, 1), is the rate at the end of the step.
+        begin: (f, c, work, t, x) → evaluations. It computes terms that depend only on (t, y), and writes the rate into
+            work.K[0], (r, 1).
+        accept: (f, c, work, t, h, x) → evaluations. It writes the rate at the end of the step into work.last, (r, 1).
     """
 
     step: Callable[..., int]
@@ -116,7 +117,7 @@ def initial_control(
 
 
 def first_step(f: Any, work: Any, control: StepControl, t: float, end: float, x: Any) -> int:
-    """Write the length of the first step, from the rate at its start and after a short Euler step; 1 evaluation.
+    """Write the length of the first step, from the rates at its start and after a short Euler step; 1 evaluation.
 
     f has the functions of a `RightSide`, x the arrays of `States`.
 
@@ -157,21 +158,20 @@ def is_finite(x: Array) -> bool:
 
 
 def controls_error(control: StepControl) -> bool:
-    """Return True if the error determines the steps, not the mesh alone."""
+    """Return True if the error determines the steps, not only the mesh."""
     return control.rtol + control.atol > 0.0
 
 
 def shortened(control: StepControl, h: float, e: float) -> float:
-    """Return the length of the step after one of length h that is rejected with the error e."""
+    """Return the length of the next trial after a step of length h is rejected with the error e."""
     control.rejected[0] += 1
     return abs(h) * (max(_LEAST, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
 
 
 def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected: bool) -> None:
-    """Write the length of the step after one of length h that is accepted with the error e: the PI controller.
+    """Write the length of the next step after a step of length h is accepted with the error e, by the PI controller.
 
-    A step that the end of a segment shortens does not reflect the error; `control.next_h` is the length it would have
-    had.
+    A step that is shortened to end at the end of a segment does not lower the next length, `control.next_h`.
     """
     alpha = control.exponent
     beta = _BETA_ORDER * alpha
@@ -184,10 +184,10 @@ def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected:
 
 
 def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, bool]]:
-    """Return the function that chooses and takes a step, for a method's `step` and `error`.
+    """Return the function that chooses and takes a step, for the `step` and `error` of a method.
 
-    choose(f, c, work, control, t, end, x) → evaluations, and False if only steps within rounding of t have an error
-    within the tolerance. Steps end at the times of the mesh, and before them where the error requires it.
+    choose(f, c, work, control, t, end, x) → evaluations, and True if a step succeeds. It returns False if the tolerance
+    requires a step as short as the rounding of t. Steps end at the times of the mesh, or earlier if the error requires.
     """
 
     def choose(

@@ -18,7 +18,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, sqrt
 from robot_dyn.foundations.errors import QueryError
 
-_ROUNDINGS = 8  # of float64, relative to Σ |a_ij|, that a row may be off by
+_ROUNDINGS = 8  # allowed error of a sum, in units of float64 rounding of Σ |a_ij|
 
 
 @final
@@ -38,7 +38,7 @@ Coefficient = int | Fraction | float | Surd
 
 
 class Coefficients(NamedTuple):
-    """A tableau as arrays (s, s), (s,), (s,) of one arithmetic, for plain functions; and its 0 and 1."""
+    """A tableau as arrays a (s, s), b (s,), c (s,) of one arithmetic, with 0 and 1 of this arithmetic."""
 
     a: Array
     b: Array
@@ -53,13 +53,13 @@ class ButcherTableau:
     """Coefficients a, b, c of a Runge–Kutta method, exact where they are fractions or surds.
 
     Attributes:
-        a: One row for each stage; entries that a row lacks are zero.
+        a: One row for each stage; missing entries at the end of a row are zero.
         b: Weights, Σ b_i = 1.
         c: Nodes, c_i = Σ_j a_ij.
-        order: Order of convergence, as in the source; the tests measure it.
+        order: Order of convergence stated by the source; the tests measure it.
 
     Raises:
-        QueryError: If the lengths do not fit, or a sum is off by more than rounding.
+        QueryError: If the lengths do not match, or a sum is wrong by more than rounding.
     """
 
     a: tuple[tuple[Coefficient, ...], ...]
@@ -71,7 +71,7 @@ class ButcherTableau:
     def __post_init__(self) -> None:
         stages = len(self.b)
         if not stages or len(self.a) != stages or len(self.c) != stages or any(len(row) > stages for row in self.a):
-            raise QueryError(f"a tableau of {stages} weights needs {stages} nodes and rows of {stages} entries at most")
+            raise QueryError(f"a tableau of {stages} weights needs {stages} nodes and rows of up to {stages} entries")
         if self.order < 1:
             raise QueryError(f"order must be positive, got {self.order}")
         _require_sum("b", self.b, 1)
@@ -80,11 +80,11 @@ class ButcherTableau:
 
     @property
     def explicit(self) -> bool:
-        """Whether each stage needs only those before it."""
+        """True if each stage depends only on earlier stages."""
         return all(len(row) <= i for i, row in enumerate(self.a))
 
     def arrays(self, kind: Arithmetic) -> Coefficients:
-        """Return the coefficients in an arithmetic, zeros included."""
+        """Return the coefficients in an arithmetic, including zeros."""
         cached = self._arrays.get(kind.dtype)
         if cached is not None:
             return cached
@@ -98,7 +98,7 @@ class ButcherTableau:
 
 
 def combine(weights: Array, k: Sequence[Array] | Array) -> Array:
-    """Σ_j w_j k_j over the weights that are not zero, of which there must be one."""
+    """Return Σ_j w_j k_j over the nonzero weights; there must be at least one."""
     first, *rest = [stage * weight for weight, stage in zip(weights, k, strict=True) if weight != 0]
     for term in rest:
         first = first + term

@@ -1,38 +1,38 @@
-"""Time stepping by Moreau and Jean: velocities that jump, at impacts and where dry friction takes hold, within a step.
+"""Moreau–Jean time stepping: velocities may jump within a step, at impacts and where dry friction stops a joint.
 
     q_m = q + h/2 v,   v⁺ from M(q_m) (v⁺ − v) = h (τ − C v − N) + the impulses on held joints,
     q⁺ = q_m + h/2 v⁺
 
-The impulses are those of a convex problem in v⁺. Within a step, events are neither
-located nor counted, and the order is 1. Without set-valued effects it is the method of Störmer and Verlet in its form
-for positions, with forces that may depend on v. [Moreau 1988; Jean, The non-smooth contact dynamics method, 1999;
-Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, §10.1]
+The impulses solve a convex problem in v⁺. Events within a step are neither located nor counted, and the order is 1.
+Without set-valued effects it is the position form of the Störmer–Verlet method, with forces that may depend on v.
+[Moreau 1988; Jean, The non-smooth contact dynamics method, 1999; Acary, Brogliato, Numerical Methods for Nonsmooth
+Dynamical Systems, 2008, §10.1]
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Scalar
 from robot_dyn.foundations.convex import active_set
 from robot_dyn.integrate.integrator import PlainMethod, RightSide, States, Stepper, System, arithmetic_like
 from robot_dyn.integrate.primitives import copy, evaluate
 
 
 class Problem(NamedTuple):
-    """First rows of the numbers of a convex problem of n joints in an array; v⁺ and its places come before them.
+    """Layout of the convex problem of n joints in an array: the first row of each part, after v⁺ and its places.
 
     Attributes:
         changed: Number of places that changed.
         M: The upper triangle of the mass matrix, by rows.
         p: M v and the known impulses, (n,).
-        f: Greatest impulses of friction, (n,).
+        f: Largest impulses of friction, (n,).
         lower, upper: Bounds of v⁺, (n,).
-        u: The actuation, the first of the torques that work, (n,).
-        rest: The other torques that work, then the rates of states of controller and effects, then shares of effects.
+        u: The actuation, the first of the torques that do work, (n,).
+        rest: The other torques that do work, then the rates of controller and effect states, then shares of effects.
     """
 
     changed: int
@@ -46,7 +46,7 @@ class Problem(NamedTuple):
 
 
 def problem_rows(n: int) -> Problem:
-    """Return the rows of the problem of n joints."""
+    """Return the layout of the problem of n joints."""
     M = 2 * n + 1
     p = M + n * (n + 1) // 2
     f, lower, upper, u, rest = (p + k * n for k in range(1, 6))
@@ -57,10 +57,10 @@ class Work(NamedTuple):
     """The arrays of a step.
 
     Attributes:
-        K: v and u of the latest step, where a rate has them, (1, r, W).
-        y: The state, the step, and the places of v⁺ after the step before, (m + 1 + n, W).
+        K: v and u of the latest step, in the rows of a rate, (1, r, W).
+        y: The state, the step, and the places of v⁺ after the previous step, (m + 1 + n, W).
         out: y⁺, then the rows of `Problem`, (m + R, W).
-        again: y⁺ of runs that are solved alone, (m, W).
+        again: y⁺ of runs that are solved separately, (m, W).
         M, problem, L: Arrays for the problem of one run, (n, n), (6, n) and (n + 1, n).
     """
 
@@ -73,7 +73,7 @@ class Work(NamedTuple):
     L: Array
 
 
-def time_step(f: RightSide, rows: Problem, work: Work, t: Any, h: Any, x: States) -> int:
+def time_step(f: RightSide, rows: Problem, work: Work, t: Scalar, h: Scalar, x: States) -> int:
     """Take a step; see `Stepper` for the arguments. The solution starts from the places of the previous step."""
     n, m, out, y, after = len(work.M), len(x.y), work.out, x.y, x.after
     copy(work.y[:m], y)
@@ -100,13 +100,13 @@ def time_step(f: RightSide, rows: Problem, work: Work, t: Any, h: Any, x: States
 
 
 def solved_alone(rows: Problem, work: Work, out: Array, b: int) -> bool:
-    """Solve the problem of run b by the active set, where Newton's method cycles; return False if it has no solution.
+    """Solve the problem of run b by the active-set method if Newton's method cycles; return False without a solution.
 
     Args:
-        rows: Rows of the problem in `out`.
-        work: Arrays of the step.
-        out: v⁺ and its places, which are written, and the problem.
-        b: The run.
+        rows: Layout of the problem in `out`.
+        work: Work arrays of the step.
+        out: The problem; v⁺ and its places are written.
+        b: Index of the run.
     """
     n, k, problem = len(work.M), rows.M, work.problem
     for i in range(n):
@@ -126,10 +126,9 @@ def solved_alone(rows: Problem, work: Work, out: Array, b: int) -> bool:
 @final
 @dataclass(frozen=True)
 class MoreauJean(PlainMethod):
-    """The method of Moreau and Jean: of order 1, through impacts and sticking friction, without events.
+    """The Moreau–Jean method of order 1, which steps through impacts and sticking friction without events.
 
-    On an equation y' = f(t, y) without jumps it is a method like others, with y = (q, v, quadratures)
-    and q' = v.
+    It also applies to equations y' = f(t, y) without jumps, with y = (q, v, quadratures) and q' = v.
     """
 
     name: str = "MoreauJean"
@@ -153,7 +152,7 @@ class MoreauJean(PlainMethod):
         )
         return Stepper(time_step, places, work)
 
-    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
+    def step(self, system: System, t: Scalar, y: Array, h: Scalar) -> Array:
         n, h = system.n, arithmetic_like(y).number(h)
         half = h / 2
         middle, after = np.array(y), np.array(y)

@@ -2,7 +2,7 @@
 
 result            base class of results: a sentence, tables, omitted parts
 figure            the layout of their figures
-save              save_result: figure, CSV or JSON by the suffix
+save              saves a result: figure, CSV or JSON by the suffix
 environment       versions and processor
 timing            times of alternating calls; time_budget: the time that a measurement may take
 """

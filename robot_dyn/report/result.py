@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.result import reported
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from robot_dyn.report.save import drawn, write_result
 
 INTERRUPTED = "the remaining parts, because of an interruption"
 
@@ -42,7 +40,7 @@ class Result(Answer):
         raise NotImplementedError
 
     @property
-    def rows(self) -> Iterable[Mapping[str, Any]]:
+    def rows(self) -> Iterable[Mapping[str, object]]:
         """Rows of the table, values by column."""
         return ()
 
@@ -57,6 +55,22 @@ class Result(Answer):
         yield from (f"left out: {part}" for part in self.left_out)
         yield ", ".join(f"{name} {value}" for name, value in self.environment.items())
 
+    def save(self, path: str | Path, *, theme: str = "light") -> Path:
+        """Save the result in the format of the suffix of `path`; without a suffix, in the first format it supports.
+
+        PNG, SVG and PDF contain the figure and CSV the table of a certificate, of costs, of work and precision, of two
+        runs or of a budget; JSON contains any result. An existing file is replaced only if it has the same format.
+
+        Args:
+            path: Path of the file.
+            theme: "light" or "dark" background.
+
+        Raises:
+            QueryError: If `theme` is unknown.
+            ResultError: If the suffix is unknown, the file cannot be written, or there is nothing to draw.
+        """
+        return write_result(self, path, theme)
+
     @property
     def drawing(self) -> str:
         from robot_dyn.foundations.display import inline
@@ -65,12 +79,3 @@ class Result(Answer):
             return inline(drawn(self, "page")) if self.diagram else ""
         except RobotDynError:  # there is nothing to draw
             return ""
-
-
-def drawn(result: Result, theme: str = "light") -> Figure:
-    """Draw a result by the module in `diagram`.
-
-    Raises:
-        ResultError: If there is nothing to draw.
-    """
-    return import_module(result.diagram).draw(result, theme)

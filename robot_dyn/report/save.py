@@ -1,43 +1,41 @@
-"""The writer of results: a figure, a CSV table of the rows, or JSON, by the suffix."""
+"""Save a result in the format of a suffix: a figure, a CSV table of its rows, or JSON."""
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from robot_dyn.foundations import files
 from robot_dyn.foundations.result import json_text
-from robot_dyn.foundations.validate import choice, instance
+from robot_dyn.foundations.validate import choice
 from robot_dyn.report.figure import ResultError
-from robot_dyn.report.result import Result, drawn
 from robot_dyn.view.plots.figure import THEMES
-from robot_dyn.view.plots.plots import PICTURES
+from robot_dyn.view.plots.pictures import PICTURES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 JSON = files.FileKind("a result", ".json", b'{\n "robot":')
 
 
-def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Path:
-    """Write a result in the format of the suffix of `path`; without a suffix, in the first format it supports.
+class Saved(Protocol):
+    """The parts of a `Result` that its files contain; `Result` describes them."""
 
-    PNG, SVG and PDF contain the figure and CSV the table of a certificate, of costs, of work and precision, of two
-    runs or of a budget; JSON contains any result. An existing file is replaced only if it has the same kind.
+    columns: ClassVar[tuple[str, ...]]
+    diagram: ClassVar[str]
 
-    Args:
-        result: A result of `certify`, `cost`, `stress`, `work_precision`, `diff_runs` or `budget`.
-        path: Path of the file.
-        theme: "light" or "dark" background.
+    @property
+    def rows(self) -> Iterable[Mapping[str, object]]:
+        """Rows of the table."""
+        ...
 
-    Raises:
-        QueryError: If an argument is invalid.
-        ResultError: If the file cannot be written, or there is nothing to draw.
-    """
-    instance(
-        "result",
-        result,
-        Result,
-        "give a result of rd.accuracy (certify, cost, work_precision), rd.diff_runs or a tool",
-    )
+
+def write_result(result: Saved, path: str | Path, theme: str) -> Path:
+    """Save a result; see `Result.save`."""
     choice("theme", theme, THEMES)
     path = files.target(path, kinds(type(result)), ResultError)
     stream = io.BytesIO()
@@ -50,21 +48,30 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
     return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
 
 
-def kinds(result_type: type[Result]) -> tuple[files.FileKind, ...]:
+def kinds(result_type: type[Saved]) -> tuple[files.FileKind, ...]:
     """Return the kinds of file in which results of a class can be written."""
     tables = (table_kind(result_type),) if result_type.columns else ()
     return (*(PICTURES if result_type.diagram else ()), *tables, JSON)
 
 
-def table_kind(result_type: type[Result]) -> files.FileKind:
+def table_kind(result_type: type[Saved]) -> files.FileKind:
     """Return the kind of the CSV table of a class of results."""
     return files.FileKind("a table of results", ".csv", ",".join(result_type.columns[:2]).encode())
 
 
-def table(result: Result) -> str:
+def table(result: Saved) -> str:
     """Return the rows of a result as CSV."""
     text = io.StringIO()
     writer = csv.DictWriter(text, result.columns, extrasaction="ignore")
     writer.writeheader()
     writer.writerows({key: files.table_cell(x) for key, x in row.items()} for row in result.rows)
     return text.getvalue()
+
+
+def drawn(result: Saved, theme: str = "light") -> Figure:
+    """Draw a result by the module in `diagram`.
+
+    Raises:
+        ResultError: If there is nothing to draw.
+    """
+    return import_module(result.diagram).draw(result, theme)

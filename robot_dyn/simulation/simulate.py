@@ -92,7 +92,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
     results = Results(
         ran.setup, recording, ran.observer, error, dict(setup.about), ran.engine.exact_right_angles, ran.remarks
     )
-    known: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         "joint_names": setup.plant.dynamics.joint_names,
         "t": recording.t,
         "events": recording.events,
@@ -100,8 +100,8 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         "accuracy": None,
     }
     if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # later reads are not allowed
-        later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
-        known |= {name: getattr(results, name) for name in later}
+        later = [field.name for field in fields(Trajectory) if field.name not in (*attributes, "statistics")]
+        attributes |= {name: getattr(results, name) for name in later}
     method = ran.setup.method
     statistics = Statistics(
         method=EXPLICIT if method.name == AUTO else method.name,
@@ -117,7 +117,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         companion_runs=runner.runs,
         user_code=", ".join(named(part) for part, _ in setup.undeclared),
     )
-    return derived(Trajectory, results, statistics=statistics, **known)
+    return derived(Trajectory, results, statistics=statistics, **attributes)
 
 
 class _Ran(NamedTuple):

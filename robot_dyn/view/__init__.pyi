@@ -8,5 +8,5 @@ from robot_dyn.view.page import Page as Page
 from robot_dyn.view.plots.figure import NEAR as NEAR
 from robot_dyn.view.plots.figure import shortened as shortened
 from robot_dyn.view.plots.parts import PLOTS as PLOTS
-from robot_dyn.view.plots.parts import PlotError as PlotError
+from robot_dyn.view.plots.pictures import PlotError as PlotError
 from robot_dyn.view.plots.shown import Figure as Figure

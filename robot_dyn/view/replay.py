@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from robot_dyn.foundations.errors import ModelWarning
-from robot_dyn.foundations.files import target
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.document import document_of, still
-from robot_dyn.view.page import PAGE, Page, ReplayError
+from robot_dyn.view.page import Page
 
 
 def replay(
@@ -41,28 +40,6 @@ def replay(
         QueryError: If a run carries no robot, or `frame` is not one of its links.
     """
     return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes))
-
-
-def save_replay(
-    run: TrajectoryData,
-    path: str | Path,
-    *ghosts: TrajectoryData,
-    package_dirs: Iterable[str | Path] = (),
-    frame: str | None = None,
-    inertia: bool = False,
-    meshes: Literal["full", "coarse"] = "full",
-) -> Path:
-    """Write a replay as one HTML file that needs neither server nor network; arguments as in `replay`.
-
-    An existing page of that name is replaced; a file of another kind is not.
-
-    Raises:
-        ReplayError: If a run has no samples.
-        QueryError: If a run carries no robot, or `frame` is not one of its links.
-        ReplayError: If the file cannot be written.
-    """
-    file = target(path, PAGE, ReplayError)
-    return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes)).save(file)
 
 
 def show(

@@ -22,14 +22,16 @@ def scenes() -> dict[str, rd.Setup]:
     control = rd.control.ComputedTorque(panda, reach, *rd.control.gains_from(1.0, 8.0, 0.9))
     friction, spring = rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([30.0, 0.0], [0.2, 0.0])
     return {
-        "pendulum": rd.Setup(rd.Plant(rd.load("pendulum")), [2.5], [0.7], 2.0, None, rk4, 4e-3),
-        "planar_2r, friction": rd.Setup(rd.Plant(double, [friction]), [0.4, -0.7], [0.3, 0.5], 1.0, None, rk4, 5e-3),
-        "panda, free swing": rd.Setup(rd.Plant(panda), READY, None, 1.0, None, rk4, 2e-3),
+        "pendulum": rd.Setup(rd.Plant(rd.load("pendulum")), [2.5], [0.7], duration_s=2.0, method=rk4, step_s=4e-3),
+        "planar_2r, friction": rd.Setup(
+            rd.Plant(double, [friction]), [0.4, -0.7], [0.3, 0.5], duration_s=1.0, method=rk4, step_s=5e-3
+        ),
+        "panda, free swing": rd.Setup(rd.Plant(panda), READY, None, duration_s=1.0, method=rk4, step_s=2e-3),
         "panda, computed torque": rd.Setup(
-            rd.Plant(panda), READY + 0.1, np.full(7, -0.2), 0.5, control, rk4, 5e-3
+            rd.Plant(panda), READY + 0.1, np.full(7, -0.2), duration_s=0.5, controller=control, method=rk4, step_s=5e-3
         ),
         "cart_pole, spring": rd.Setup(
-            rd.Plant(rd.load("cart_pole"), [spring]), [0.1, 0.8], [0.3, -0.5], 1.0, None, rk4, 5e-3
+            rd.Plant(rd.load("cart_pole"), [spring]), [0.1, 0.8], [0.3, -0.5], duration_s=1.0, method=rk4, step_s=5e-3
         ),
     }  # fmt: skip
 

@@ -35,7 +35,7 @@ def precision(effort: Effort) -> None:
     row("whole call of simulate, DOP853", *(f"{1e3 * x:.3f}" for x in whole(setup, effort)), *["—"] * len(TARGETS))
     print("\n( ) extrapolated by the order.", result.sentence)
     if (picture := effort.picture("precision")) is not None:
-        rd.accuracy.save_result(result, picture)
+        result.save(picture)
 
 
 def whole(setup: rd.Setup, effort: Effort) -> list[float]:

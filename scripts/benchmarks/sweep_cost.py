@@ -44,7 +44,7 @@ def made(self, *given):
     first.append(time.perf_counter() - began)
     return plain(self, *given)
 Work.made = made
-done = sw.read({out!r})
+done = sw.read_sweep({out!r})
 sw.run(done.sweep, {out!r}, threads=2)
 print(f"{{done.folder.count}} chunks: the work begins {{first[0]:.2f}} s after the import of the room;"
       f" with its last chunk {{time.perf_counter() - began:.2f}} s, CPU {{time.process_time() - cpu:.2f}} s")
@@ -133,7 +133,7 @@ def samples(given: argparse.Namespace) -> None:
 def rollouts_of(setup: rd.Setup, values: dict[str, np.ndarray], work: Work) -> None:
     """What a user would call for the runs of a chunk."""
     params = {name: x for name, x in values.items() if name != "q0"}
-    rd.rollouts(setup, values.get("q0"), params=params, record=work.record, threads=1)
+    rd.rollouts(setup, values.get("q0"), vary=params, record=work.record, threads=1)
 
 
 def overhead(given: argparse.Namespace) -> None:

@@ -191,8 +191,8 @@ def setup(
     """Return the setup of a run; `engine` is "compiled", "interpreted" or "auto"."""
     options = {"method": by} if by is not None else {}
     return rd.Setup(
-        plant, q0, v0, duration, controller=controller, step_s=step, record_every_s=record, estimate_error=estimate,
-        engine=engine, events=events, accuracy=accuracy, **options,
+        plant, q0, v0, duration_s=duration, controller=controller, step_s=step, record_every_s=record,
+        estimate_error=estimate, engine=engine, events=events, accuracy=accuracy, **options,
     )  # fmt: skip
 
 
@@ -250,10 +250,10 @@ def run_values(run: Any) -> tuple[Values, Texts]:
 
 
 def rollouts(
-    of: Any, q0: Any, v0: Any = None, params: Mapping[str, Any] | None = None, record: Sequence[str] = ("q", "v")
+    of: Any, q0: Any, v0: Any = None, vary: Mapping[str, Any] | None = None, record: Sequence[str] = ("q", "v")
 ) -> Any:
     """Run a batch on one thread."""
-    return rd.rollouts(of, q0, v0, params=params, record=tuple(record), threads=1)
+    return rd.rollouts(of, q0, v0, vary=vary, record=tuple(record), threads=1)
 
 
 def rollouts_values(runs: Any) -> tuple[Values, Texts]:

@@ -77,7 +77,7 @@ def run_case(case: Case, pushes: bool = True) -> Result:
 
     def made(push: float) -> tuple[Values, Texts]:
         if case.is_batch:
-            runs = lib.rollouts(case.setup, case.q0 + push * signs, case.v0 + push * signs, case.params, case.record)
+            runs = lib.rollouts(case.setup, case.q0 + push * signs, case.v0 + push * signs, case.vary, case.record)
             return lib.rollouts_values(runs)
         if push == 0.0:
             return lib.run_values(lib.simulate(case.setup))

@@ -35,7 +35,7 @@ class Case:
     setup: Any
     q0: Any = None
     v0: Any = None
-    params: dict[str, np.ndarray] | None = None
+    vary: dict[str, np.ndarray] | None = None
     record: tuple[str, ...] = ("q", "v")
 
     @property
@@ -272,7 +272,7 @@ def batch(B: int, q: np.ndarray, seed: int) -> np.ndarray:
 
 
 def of_batch(
-    effects: Callable[[], Any], by: str, params: Callable[[int], dict[str, np.ndarray]], law: Any = None
+    effects: Callable[[], Any], by: str, vary: Callable[[int], dict[str, np.ndarray]], law: Any = None
 ) -> Case:
     B, q0 = 12, batch(12, Q2, 3)
     fixed = by not in ("DOP853",)
@@ -281,7 +281,7 @@ def of_batch(
         2e-3 if fixed else None, 0.02, estimate=False,
     )  # fmt: skip
     record = ("q", "v", "u", "energy", "work")
-    return Case(setup, q0, np.tile(V2, (B, 1)), {lib.parameter(k): x for k, x in params(B).items()}, record)
+    return Case(setup, q0, np.tile(V2, (B, 1)), {lib.parameter(k): x for k, x in vary(B).items()}, record)
 
 
 def spread(low: float, high: float, B: int) -> np.ndarray:

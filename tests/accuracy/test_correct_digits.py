@@ -237,7 +237,10 @@ def test_the_estimate_is_no_less_than_the_error() -> None:
             lambda robot, q: rd.accuracy.digits(robot, "N", [q, q]),
             r"digits are counted at one state: q must have .* got \(2, 2\)",
         ),
-        (lambda robot, q: rd.accuracy.warn_below(robot, 21), "digits must be at most 20, got 21: no more are counted"),
+        (
+            lambda robot, q: rd.accuracy.warn_below(robot, 21),
+            "digits must be at most 20, the most that are counted, got 21",
+        ),
     ],
 )
 def test_mistakes_are_told(ask, message: str) -> None:

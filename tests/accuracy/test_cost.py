@@ -159,7 +159,7 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
 
 
 def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
-    monkeypatch.setattr("robot_dyn.accuracy.costs.query_cost._MOST_TIMED", 30)
+    monkeypatch.setattr("robot_dyn.accuracy.costs.query_cost._MAX_TIMED", 30)
     found = rd.accuracy.cost(setup(), budget_s=20.0, repeats=1)
     row = found.of("forward dynamics")
     assert row.first.instructions > 30 and not row.first.times
@@ -249,7 +249,7 @@ def test_json_and_rows_hold_the_alternatives() -> None:
 
 def test_a_time_that_was_not_measured_is_an_empty_cell(tmp_path) -> None:
     result = rd.accuracy.cost(setup(FRICTION), **TINY)
-    with rd.accuracy.save_result(result, tmp_path / "cost.csv").open(newline="", encoding="utf-8") as file:
+    with result.save(tmp_path / "cost.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert rows and all(row["first_time_s"] == row["second_time_s"] == "" for row in rows)
 

@@ -190,7 +190,7 @@ def test_the_common_part_of_runs_of_different_length_is_compared_and_said() -> N
     a, b = coasting(loaded(1.0)), coasting(loaded(1.0), duration_s=0.8)
     found = rd.diff_runs(a, b)
     assert found.end == DURATION and found.parted is None
-    assert found.left_out == ("0.5 to 0.8 s, which only run 2 has",)
+    assert found.left_out == ("0.5 to 0.8 s, covered by run 2 only",)
 
 
 @pytest.mark.parametrize("changes", ["damping", "gain", "reference", "period", "model", "start", "gravity"])
@@ -239,8 +239,8 @@ def test_runs_that_have_nothing_in_common_are_refused() -> None:
 
 def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Path) -> None:
     for name, mass in (("light", 1.0), ("heavy", 2.0)):
-        rd.save_run(coasting(loaded(mass)), tmp_path / name)
-    light, heavy = (rd.load_run(tmp_path / f"{name}.npz") for name in ("light", "heavy"))
+        coasting(loaded(mass)).save(tmp_path / name)
+    light, heavy = (rd.read(tmp_path / f"{name}.npz") for name in ("light", "heavy"))
     found = rd.diff_runs(light, heavy)
     assert found.names == ("light", "heavy") and [each.name for each in found.settings] == ["payload on rod"]
     old = replace(light, about={name: text for name, text in light.about.items() if name != "settings"})
@@ -251,7 +251,7 @@ def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Pat
 def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:
     """JSON has the keys that docs/reference/json.md promises; the exit code is 0 though the runs differ."""
     for name, mass in (("a", 1.0), ("b", 2.0)):
-        rd.save_run(coasting(loaded(mass)), tmp_path / name)
+        coasting(loaded(mass)).save(tmp_path / name)
     paths = (tmp_path / "a.npz", tmp_path / "b.npz")
     keys, found = promised("diff-runs"), document("diff-runs", *paths)
     assert found.keys() == keys.keys()

@@ -1,4 +1,4 @@
-"""Error against work: orders, the front, the reference and its horizon, what is believed and what is extrapolated."""
+"""Error against work: orders, the front, the reference and its horizon, resolved and extrapolated errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
     recorded,
     whole,
 )
-from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.peers import methods_of_peers
 from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, past_horizon, reference
 from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
 from robot_dyn.foundations import json_text, plain
@@ -163,14 +163,14 @@ def test_an_accuracy_of_the_setup_is_not_used() -> None:
 
 
 def test_a_motion_without_reference_is_refused() -> None:
-    with pytest.raises(HorizonError, match=r"no run of 0\.3 s ends by DOP853 or Rodas5P"):
+    with pytest.raises(HorizonError, match=r"no run of 0\.3 s by DOP853 or Rodas5P finishes"):
         rd.accuracy.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
 
 
-def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
+def points(*errors: float, resolved: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
     """Runs that take 1, 2, 4, … times as many steps and as long."""
     return tuple(
-        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, believed, times=(each_s * 2**k,)) for k, e in enumerate(errors)
+        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, resolved, times=(each_s * 2**k,)) for k, e in enumerate(errors)
     )
 
 
@@ -234,20 +234,20 @@ def test_no_run_beats_one_of_the_front_and_each_other_is_beaten() -> None:
     ]
     front = [p for _, p in invented(*(of(str(k), each) for k, each in enumerate(runs))).front]
     assert len(front) > 3
-    believed = [p for each in runs for p in each if p.believed]
-    for p in believed:
-        beaten = any(o.error <= p.error and o.time_s <= p.time_s and o is not p for o in believed)
+    resolved = [p for each in runs for p in each if p.resolved]
+    for p in resolved:
+        beaten = any(o.error <= p.error and o.time_s <= p.time_s and o is not p for o in resolved)
         assert beaten != (p in front)
-    assert all(p.believed for p in front)
+    assert all(p.resolved for p in front)
 
 
-def test_errors_below_that_of_the_reference_are_not_believed(smooth) -> None:
+def test_errors_below_that_of_the_reference_are_not_resolved(smooth) -> None:
     """DOP853 at 1e-13 ends nearer to the reference than the two runs of that are to each other: it takes no part."""
     setup, truth = smooth
     coarse = replace(truth, error=1e-6)
     found = ladder(own(setup, rd.integrate.method("DOP853"), "interpreted"), coarse, 0, 12)
-    assert [p.believed for p in found.points] == [p.error > 1e-6 for p in found.points]
-    assert not found.points[-1].believed and found.points[0].believed
+    assert [p.resolved for p in found.points] == [p.error > 1e-6 for p in found.points]
+    assert not found.points[-1].resolved and found.points[0].resolved
     assert all(p.error > 1e-6 for _, p in invented(found, floor=1e-6).front)
     assert found.price(1e-7) is None
 
@@ -279,7 +279,7 @@ def test_the_sentence_marks_what_is_extrapolated() -> None:
     assert said == "6 digits of q over 1 s: DOP853 2.8 ms; Other RK 1 s; Euler would take 10 s (extrapolated)"
     quick = of("Other RK", points(1e-4, 1e-6, 1e-8), engine="")
     assert invented(fast, quick).sentence == "6 digits of q over 1 s: Other RK 2 ms; DOP853 2.8 ms"
-    assert invented(slow).sentence_of(3) == "3 digits of q were reached by no run"
+    assert invented(slow).sentence_of(3) == "no run reached 3 digits of q"
     assert format_duration(0.00031) == "310 µs" and format_duration(7200.0) == "2 h"
 
 
@@ -325,7 +325,7 @@ def test_other_programs_solve_the_same_equation(setup: rd.Setup, first: int) -> 
     """
     import_module("mujoco")
     setup, truth = reference(whole(replace(setup, engine="compiled")), Budget(1e3))
-    peers, _ = found(setup)
+    peers, _ = methods_of_peers(setup)
     theirs = {each.method: each for each in peers}
     assert {"SciPy DOP853 + pin.aba", "MuJoCo RK4", "MuJoCo Euler", "MuJoCo implicitfast"} <= theirs.keys()
     ours = ladder(own(setup, rd.integrate.method("RK4"), "compiled", events=False), truth, first, first + 2)
@@ -341,10 +341,10 @@ def test_programs_that_cannot_do_a_scene_are_left_out_with_the_reason() -> None:
     plant = rd.Plant(arm, [rd.effects.DryFriction(0.1)])
     sampled = rd.control.PD(rd.control.hold([0.0, 0.0]), 10.0, 1.0, period_s=0.01)
     for setup, why in (
-        (rd.Setup(plant, [0.4, 0.9], duration_s=0.5), "dry_friction is not given to them"),
-        (rd.Setup(rd.Plant(arm), [0.4, 0.9], controller=sampled, duration_s=0.5), "a continuous PD is"),
+        (rd.Setup(plant, [0.4, 0.9], duration_s=0.5), "dry_friction is not supported"),
+        (rd.Setup(rd.Plant(arm), [0.4, 0.9], controller=sampled, duration_s=0.5), "only a continuous PD"),
     ):
-        peers, left_out = found(recorded(setup, 0.5))
+        peers, left_out = methods_of_peers(recorded(setup, 0.5))
         assert not peers and why in left_out[0]
 
 
@@ -353,7 +353,7 @@ def test_a_program_with_other_torques_is_refused() -> None:
     arm, damping = motion.robot, np.array([0.3, 0.2])
     bias = partial(arm.inverse_dynamics, a=np.zeros(2))
     motion.check(arm.M, bias, lambda t, q, v: -damping * v)
-    with pytest.raises(PeerError, match="the torques of control and effects differ by"):
+    with pytest.raises(PeerError, match="the torque of control and effects differs by"):
         motion.check(arm.M, bias, lambda t, q, v: -1.000001 * damping * v)
 
 
@@ -372,7 +372,7 @@ def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
 
     monkeypatch.setattr("robot_dyn.accuracy.work_precision_diagram.peers.PEERS", {"scipy": broken})
     setup = recorded(whole(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3])), 0.1)
-    assert found(setup) == ([], ["scipy: cannot be imported (no library)"])
+    assert methods_of_peers(setup) == ([], ["scipy: cannot be imported (no library)"])
 
 
 def test_json_holds_the_runs() -> None:
@@ -410,7 +410,7 @@ def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() 
     more = ladder("Third RK", 2.0, 1.0), ladder("Fourth RK", 1e-8)
     assert list(programs(invented(*other, *own, *more), 1e-8)) == [
         "  robot_dyn DOP853: 2 ms", "  Fourth RK: 1 ms, 0.5 times as long", "  Other RK4: 200 ms, 100 times as long",
-        "  Third: reached by no run (late)", "  times of prepared runs, the least of runs that take turns",
+        "  Third: not reached (late)", "  times: least time of prepared runs that take turns",
     ]  # fmt: skip
     lost = list(programs(invented(ladder("DOP853", 2.0, 1.0, engine="compiled"), *other), 1e-8))
-    assert lost[:2] == ["  robot_dyn: reached by no run (late)", "  Other RK4: 200 ms"]
+    assert lost[:2] == ["  robot_dyn: not reached (late)", "  Other RK4: 200 ms"]

@@ -58,12 +58,12 @@ def flipped(count: int, seed: int, folder: Path) -> Iterator[str]:
     done = sw.run(swept(folder, 64, samples="q"), folder / "out", chunk=32)
 
     def table() -> dict[str, np.ndarray]:
-        read = sw.read(done.path)
+        read = sw.read_sweep(done.path)
         read.verify()
         return {name: np.asarray(x, "U" if x.dtype == object else None) for name, x in read.table().items()}
 
     def samples() -> dict[str, np.ndarray]:
-        kept = sw.read(done.path).samples()
+        kept = sw.read_sweep(done.path).samples()
         return {name: kept[name].values for name in kept.variables}
 
     yield from flips(min((done.path / "rows").glob("*.parquet")), table, count, rng)

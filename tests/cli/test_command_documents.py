@@ -53,7 +53,7 @@ def test_query():
     assert {key for share in why["why"]["shares"] for key in share} == set(re.findall(r"`(\w+)`", inside))
 
 
-@pytest.mark.parametrize(("command", "part"), [("explain", "effects"), ("sweepable", "parameters")])
+@pytest.mark.parametrize(("command", "part"), [("explain", "effects"), ("parameters", "parameters")])
 def test_of_a_scene(command: str, part: str, tmp_path: Path):
     keys = promised(command)
     (tmp_path / "scene.toml").write_text(starter("cart_pole"), encoding="utf-8")

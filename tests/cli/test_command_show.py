@@ -22,7 +22,7 @@ PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory) -> Path:
     swing = rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.2, estimate_error=False)
-    return rd.save_run(swing, tmp_path_factory.mktemp("run") / "run.npz")
+    return swing.save(tmp_path_factory.mktemp("run") / "run.npz")
 
 
 @pytest.mark.long
@@ -38,12 +38,12 @@ def test_the_demo_ends_with_a_replay_a_plot_and_a_run(tmp_path, browser) -> None
     named = [Path(line.split()[0]) for line in files.splitlines() if line.strip()]
     assert [path.name for path in named] == ["panda.html", "panda.png", "panda.npz", "panda.toml"]
     assert all(path.stat().st_size > 100 for path in named)
-    assert re.search(r"\n  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", price)
+    assert re.search(r"\n  robot_dyn.*: ([\d.]+ [µm]?s|not reached)", price)
     for module, program in PROGRAMS.items():
         installed = find_spec(module) is not None
-        assert bool(re.search(rf"\n  {program}.*: (.* times as long|reached by no run)", price)) is installed
+        assert bool(re.search(rf"\n  {program}.*: (.* times as long|not reached)", price)) is installed
         assert (f"left out: {module}: is not installed" in price) is not installed
-    assert rd.load_run(named[2]).outcome.ending == "finished"
+    assert rd.read(named[2]).outcome.ending == "finished"
     with opened(browser, named[0], offline=True) as view:
         assert view.ask("replay.duration") == 1.5
 
@@ -53,7 +53,7 @@ def test_the_price_needs_no_other_program(monkeypatch) -> None:
     swing = rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.2, engine="compiled")
     monkeypatch.setattr("robot_dyn.accuracy.work_precision_diagram.peers.find_spec", lambda name: None)
     lines = list(demo._price(swing))
-    assert re.match(r"  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", lines[2])
+    assert re.match(r"  robot_dyn.*: ([\d.]+ [µm]?s|not reached)", lines[2])
     named = [line for line in lines if "left out" in line]
     assert named == [f"  left out: {name}: is not installed" for name in PROGRAMS]
 
@@ -80,8 +80,8 @@ def test_help_names_every_plot() -> None:
 def files(tmp_path: Path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="RK4")
-    rd.save_run(rd.simulate(setup), "run.npz")
-    rd.save_rollouts(rd.rollouts(setup, [[0.1], [0.2]]), "runs.npz")
+    rd.simulate(setup).save("run.npz")
+    rd.rollouts(setup, [[0.1], [0.2]]).save("runs.npz")
     return tmp_path
 
 
@@ -90,7 +90,7 @@ def test_export_writes_the_table_of_a_file(files: Path, name: str) -> None:
     done = run("export", f"{name}.npz", "-o", "x.csv")
     assert done.returncode == 0, done.stderr
     assert done.stdout == f"written: x.csv ({decimal((files / 'x.csv').stat().st_size)})\n"
-    table = rd.load_run("run.npz").table() if name == "run" else rd.load_rollouts("runs.npz").table()
+    table = rd.read("run.npz").table() if name == "run" else rd.read("runs.npz").table()
     lines = (files / "x.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == ",".join(table) and len(lines) == 1 + len(next(iter(table.values())))
 
@@ -100,4 +100,4 @@ def test_the_suffix_says_the_format(files: Path, suffix: str, package: str) -> N
     pytest.importorskip(package)
     done = run("export", "run.npz", "-o", f"x.{suffix}")
     assert done.returncode == 0, done.stderr
-    assert (files / f"x.{suffix}").read_bytes() == rd.export(rd.load_run("run.npz"), f"y.{suffix}").read_bytes()
+    assert (files / f"x.{suffix}").read_bytes() == rd.read("run.npz").save(f"y.{suffix}").read_bytes()

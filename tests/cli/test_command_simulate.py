@@ -36,7 +36,7 @@ def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
         "error of q [m or rad]",
     ):
         assert said in done.stdout
-    assert rd.load_run(tmp_path / "run.npz").summary in done.stdout
+    assert rd.read(tmp_path / "run.npz").summary in done.stdout
     assert (tmp_path / "run.csv").is_file()
 
 
@@ -45,7 +45,7 @@ def test_force_replaces(scene, tmp_path) -> None:
         (tmp_path / name).touch()
     done = run("simulate", scene, "-o", tmp_path / "run.npz", "--csv", tmp_path / "run.csv", "--force")
     assert done.returncode == 0, done.stderr
-    assert rd.load_run(tmp_path / "run.npz").t[-1] == 0.2 and (tmp_path / "run.csv").stat().st_size > 1000
+    assert rd.read(tmp_path / "run.npz").t[-1] == 0.2 and (tmp_path / "run.csv").stat().st_size > 1000
 
 
 @pytest.mark.skipif(os.name != "posix", reason="/dev/full, pipes and descriptors of POSIX")
@@ -57,7 +57,7 @@ def test_a_run_is_written_whatever_becomes_of_the_output(scene, tmp_path, redire
     )
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == code
-    assert rd.load_run(tmp_path / "run.npz").t[-1] == 0.2
+    assert rd.read(tmp_path / "run.npz").t[-1] == 0.2
     assert done.stderr.count("\n") == 1 and ("standard output cannot be written" in done.stderr) == (code == 2)
 
 
@@ -102,4 +102,4 @@ def test_ctrl_c_ends_a_run_and_keeps_it(scene, tmp_path) -> None:
     scene.write_text(text + "[start]\nq = [0.4, -0.7]\n")  # it would run for many minutes
     output = tmp_path / "run.npz"
     assert "stopped at t = " in interrupted_at_work("simulate", scene, "-o", output, watched=WATCHED)
-    assert len(rd.load_run(output).t) > 1
+    assert len(rd.read(output).t) > 1

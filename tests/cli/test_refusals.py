@@ -38,8 +38,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).symlink_to(to)
     os.mkfifo(folder / "pipe.npz")
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="RK4")
-    rd.save_run(rd.simulate(setup), folder / "run.npz")
-    rd.save_rollouts(rd.rollouts(setup, [[0.1], [0.2]]), folder / "runs.npz")
+    rd.simulate(setup).save(folder / "run.npz")
+    rd.rollouts(setup, [[0.1], [0.2]]).save(folder / "runs.npz")
     return folder
 
 

@@ -58,7 +58,7 @@ def test_a_name_of_a_file_is_one_line(command: tuple[str, ...], swing: rd.Trajec
     Path(names["urdf"]).write_text(URDF, encoding="utf-8")
     text = names["urdf"].replace("\n", "\\n").replace("\x1b", "\\u001b").replace("\r", "\\r")
     Path(names["toml"]).write_text(f'robot = "{text}"\n{SCENE}', encoding="utf-8")
-    rd.save_run(swing, names["npz"])
+    swing.save(names["npz"])
     done = run(*(word.format(**names) for word in command))
     assert "all is well" in done.stdout + done.stderr or command[0] in ("query", "compare", "simulate")
     assert_harmless(done.stdout)
@@ -73,7 +73,7 @@ def test_the_summary_of_a_run_file_has_the_lines_of_a_summary(swing: rd.Trajecto
         about=swing.about | {"right_angles": HOSTILE},
         acting=(HOSTILE,), remarks=(remark,), statistics=replace(swing.statistics, method=HOSTILE, engine=HOSTILE),
     )  # fmt: skip
-    loaded = rd.load_run(rd.save_run(strange, tmp_path / "run.npz"))
+    loaded = rd.read(strange.save(tmp_path / "run.npz"))
     assert_harmless(loaded.summary)
     assert len(loaded.summary.split("\n")) == len(swing.summary.split("\n")) + 2  # right angles and a remark
 

@@ -168,7 +168,7 @@ def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
     options = {"q0": q, "duration_s": 0.01, "method": "RK4", "estimate_error": False}
     run = rd.simulate(given, **options, engine="compiled")
     assert f"\nright angles, in machine code: {words}\n" in run.summary
-    assert rd.load_run(rd.save_run(run, tmp_path / "run")).about["right_angles"] == words
+    assert rd.read(run.save(tmp_path / "run")).about["right_angles"] == words
     runs = rd.rollouts(given, q, duration_s=0.01, method="RK4")
     assert runs.about["right_angles"] == words and words in runs[0].summary
     interpreted = rd.simulate(given, **options, engine="interpreted")

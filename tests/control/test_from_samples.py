@@ -93,7 +93,7 @@ def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
     """Its q, v and a are met at the samples, exactly."""
     arm = rd.load("planar_2r")
     run = rd.simulate(arm, q0=[0.3, 0.4], duration_s=0.5)
-    plan = rd.control.from_samples(arm, rd.export(run, tmp_path / "run.csv"), ends="measured")
+    plan = rd.control.from_samples(arm, run.save(tmp_path / "run.csv"), ends="measured")
     for mine, its in zip(plan.reference.at(run.t), (run.q, run.v, run.a), strict=True):
         np.testing.assert_allclose(mine, its, atol=1e-9)
     assert np.abs(rd.control.from_samples(arm, tmp_path / "run.csv", ends="rest").reference.at(0.0)[1]).max() < 1e-10

@@ -109,7 +109,7 @@ def test_a_log_of_rd_export_is_read_back(tmp_path: Path) -> None:
     """Positions to the bit at its samples, by either topic."""
     controller = rd.control.PD(rd.control.quintic([0.1] * 6, [0.3] * 6, 0.3), 400.0, 40.0)
     run = rd.simulate(ARM, [0.1] * 6, duration_s=0.3, controller=controller)
-    path = rd.export(run, tmp_path / "run.mcap")
+    path = run.save(tmp_path / "run.mcap")
     assert run.desired is not None
     for topic, q in (("/joint_states", run.q), ("/desired/joint_states", run.desired)):
         plan = rd.control.from_samples(ARM, path, topic=topic, ends="rest")

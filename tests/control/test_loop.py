@@ -194,7 +194,7 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
         "actuation.rate_limit.rate": [300.0, 50.0], "position.noise.deviation": [1e-4, 0.0], "kp": [9.0, 50.0],
         "actuation.noise.deviation": [0.0, 0.1],
     }  # fmt: skip
-    many = rd.rollouts(setup, Q0, V0, params=params)
+    many = rd.rollouts(setup, Q0, V0, vary=params)
     for run in range(2):
         own = replace(
             EVERYTHING, controller=replace(EVERYTHING.controller, kp=params["kp"][run]), run=run,
@@ -210,7 +210,7 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
         alone = rd.simulate(setup, controller=own)
         np.testing.assert_allclose(many.q[run], alone.q, atol=1e-13)
     with pytest.raises(ControlError, match="cutoff_rad_s must be less than"):
-        rd.rollouts(setup, Q0, V0, params={"velocity.low_pass.cutoff_rad_s": [40.0, 200.0]})
+        rd.rollouts(setup, Q0, V0, vary={"velocity.low_pass.cutoff_rad_s": [40.0, 200.0]})
 
 
 def test_two_periods_that_differ_in_their_ratio_share_no_machine_code() -> None:

@@ -61,7 +61,7 @@ def test_masses_and_inertias_of_links_are_sweep_parameters() -> None:
     masses, torso = np.array([1.1, 2.9]), np.array([4.0, 7.5])
     inertias = np.stack([INERTIA, 1.7 * INERTIA])
     params = {f"{LINK}.mass": masses, f"{LINK}.inertia": inertias, "torso.mass": torso}
-    runs = rd.rollouts(setup(TREE), params=params)
+    runs = rd.rollouts(setup(TREE), vary=params)
     for k in range(2):
         robot = edited(edited(TREE, LINK, masses[k], inertias[k]), "torso", torso[k])
         alone = rd.simulate(setup(robot), engine="interpreted")
@@ -74,7 +74,7 @@ def test_masses_and_inertias_of_links_are_sweep_parameters() -> None:
 
 def test_the_links_of_a_controllers_model_are_its_own() -> None:
     values = np.array([1.1, 2.9])
-    runs = rd.rollouts(setup(TREE, TREE), params={f"model.{LINK}.mass": values})
+    runs = rd.rollouts(setup(TREE, TREE), vary={f"model.{LINK}.mass": values})
     for k, mass in enumerate(values):
         alone = rd.simulate(setup(TREE, edited(TREE, LINK, mass)), engine="interpreted")
         np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
@@ -89,7 +89,7 @@ def test_two_parameters_of_one_size_are_not_taken_for_each_other() -> None:
         ("mass_scale", [0.5, 1.3], lambda x: swing.with_(mass_scale=x)),
         ("rod.mass", [0.5, 1.3], lambda x: swing.with_(masses={"rod": x})),
     ):
-        runs = rd.rollouts(base, params={name: values})
+        runs = rd.rollouts(base, vary={name: values})
         for k, x in enumerate(values):
             alone = rd.simulate(replace(base, plant=rd.Plant(change(x))), engine="interpreted")
             np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-13)
@@ -97,7 +97,7 @@ def test_two_parameters_of_one_size_are_not_taken_for_each_other() -> None:
 
 def test_other_masses_are_kept_in_run_files(tmp_path) -> None:
     run = rd.simulate(setup(TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})))
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     assert run.acting is not None and f"mass 2.7 kg of {LINK}" in run.acting
     expected = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})
     np.testing.assert_array_equal(robot_of(again).M(STATES[0]), expected.M(STATES[0]))
@@ -137,5 +137,5 @@ def test_numbers_that_no_link_has_are_refused(change, message: str) -> None:
 )
 def test_swept_numbers_that_no_link_has_are_refused(params, message: str) -> None:
     with pytest.raises(RobotDynError, match=message) as found:
-        rd.rollouts(setup(TREE), params=params)
+        rd.rollouts(setup(TREE), vary=params)
     assert isinstance(found.value, QueryError | EditError)

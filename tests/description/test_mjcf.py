@@ -193,7 +193,7 @@ def test_a_run_of_it_is_read_again(tmp_path: Path) -> None:
     plant = rd.Plant(robot, [rd.effects.ViscousFriction(robot.damping)])
     run = rd.simulate(rd.Setup(plant, np.zeros(4), np.zeros(4), duration_s=0.01))
     q = np.array([0.1, 0.2, 0.05, -0.3])
-    again = robot_of(rd.load_run(rd.save_run(run, tmp_path / "run.npz")))
+    again = robot_of(rd.read(run.save(tmp_path / "run.npz")))
     assert np.array_equal(again.M(q), robot.M(q))
     assert again.edits.gravity == robot.edits.gravity
 

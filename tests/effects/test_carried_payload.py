@@ -141,17 +141,17 @@ def test_a_joint_that_sticks_slides_when_the_impact_reaches_it() -> None:
 def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
     plant, options = rd.Plant(ARM, [rd.effects.CarriedPayload(BODY, 0.1, 0.2)]), {"record_every_s": 0.05}
     setup = rd.Setup(plant, Q, V, 0.3, None, "DOP853", **options, estimate_error=False)
-    runs = rd.rollouts(setup, params={"gravity": [[0, 0, -G], [0, 0, -1.6]]}, record=("q", "work"))
+    runs = rd.rollouts(setup, vary={"gravity": [[0, 0, -G], [0, 0, -1.6]]}, record=("q", "work"))
     moon = replace(setup, plant=rd.Plant(ARM.with_(gravity=(0, 0, -1.6)), setup.plant.effects))
     for k, each in enumerate((setup, moon)):
         alone = rd.simulate(each)
         np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-9)
         np.testing.assert_allclose(runs.work["pick_up"][k], alone.ledger.work["pick_up"], atol=1e-9)
     run = rd.simulate(setup)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     assert [each.name for each in again.events] == [each.name for each in run.events]
     np.testing.assert_array_equal(again.ledger.residual, run.ledger.residual)
-    rd.save_replay(again, tmp_path / "page")
+    rd.replay(again).save(tmp_path / "page")
 
 
 def test_a_plant_is_asked_at_a_time() -> None:

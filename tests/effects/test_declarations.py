@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import Trajectory, export
+from robot_dyn import Trajectory
 from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError, tanh
@@ -165,7 +165,7 @@ def test_what_follows_from_a_coefficient_is_not_kept_where_that_is_swept() -> No
     """A cached property stayed what it was for the first run of a batch, and for other values of machine code."""
     setup = setup_of(Cached(1.0))
     rd.simulate(setup, engine="interpreted")  # which keeps c² = 1
-    runs = rd.rollouts(setup, params={"cached.c": [1.0, 3.0]})
+    runs = rd.rollouts(setup, vary={"cached.c": [1.0, 3.0]})
     for k, c in enumerate((1.0, 3.0)):
         np.testing.assert_allclose(runs.q[k], run(Cached(c), "interpreted").q, rtol=0, atol=1e-12)
 
@@ -366,7 +366,7 @@ def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within
     compiled, auto = rd.simulate(setup, engine="compiled"), rd.simulate(setup)
     assert auto.statistics.engine == compiled.statistics.engine
     assert f", {auto.statistics.engine}\n" in auto.summary
-    assert rd.load_run(rd.save_run(auto, tmp_path / "run")).statistics.engine == auto.statistics.engine
+    assert rd.read(auto.save(tmp_path / "run")).statistics.engine == auto.statistics.engine
     assert np.array_equal(auto.q, compiled.q)
     assert interpreted.error is not None and auto.error is not None
     within = interpreted.error.largest + auto.error.largest
@@ -669,9 +669,9 @@ def test_recorded_controller_states_obey_their_equation(
     else:  # the trapezoid rule: T h² e'' ki / 12 with |e''| < 50 rad/s²
         steps = np.diff(run.t)[:, None] * (e[1:] + e[:-1]) / 2 * ki
         np.testing.assert_allclose(z[1:], np.cumsum(steps, axis=0), rtol=0, atol=0.2 * 1e-6 * 50 * ki / 12)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     assert np.array_equal(again.controller_states, z)  # pyright: ignore[reportArgumentType]
-    rows = export(again, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    rows = again.save(tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].endswith("controller state 1,controller state 2")
     assert [float(x) for x in rows[-1].split(",")[-2:]] == z[-1].tolist()
 
@@ -679,7 +679,7 @@ def test_recorded_controller_states_obey_their_equation(
 def test_without_controller_states_nothing_is_recorded_of_them(tmp_path) -> None:
     run = rd.simulate(rd.Plant(ARM), q0=Q, duration_s=0.01, controller=ramp)
     assert run.controller_states is None
-    assert rd.load_run(rd.save_run(run, tmp_path / "run")).controller_states is None
+    assert rd.read(run.save(tmp_path / "run")).controller_states is None
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -789,7 +789,7 @@ def test_the_example_of_a_controller_can_be_swept_and_is_compiled() -> None:
     names: dict[str, Any] = {"rd": rd, "dataclass": dataclass, "field": field}
     exec(dedent(text[text.index("        @dataclass") :]), names)
     setup = rd.Setup(rd.Plant(ARM), Q, duration_s=0.1, controller=names["Damped"](ARM, 3.0), engine="compiled")
-    assert "damping" in repr(rd.sweepable(setup))
+    assert "damping" in repr(rd.parameters(setup))
     run = rd.simulate(setup)
     assert run.statistics.engine == "compiled"
     assert np.abs(run.q[-1] - Q).max() < 1e-12

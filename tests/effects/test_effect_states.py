@@ -167,13 +167,12 @@ def test_passive_bristles_only_take_energy() -> None:
 
 def test_effect_states_are_kept_in_run_files_and_tables(tmp_path) -> None:
     run = rd.simulate(setup("compiled"))
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     for name in ("actuator_lag", "lugre_friction"):
         np.testing.assert_array_equal(again.effect_states[name], run.effect_states[name])
     np.testing.assert_array_equal(again.ledger.stored["lugre_friction"], run.ledger.stored["lugre_friction"])
-    from robot_dyn import export
 
-    heading = export(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0]
+    heading = run.save(tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0]
     assert heading.endswith("actuator_lag state 1,actuator_lag state 2,lugre_friction state 1,lugre_friction state 2")
 
 

@@ -276,7 +276,7 @@ def test_a_stop_that_differs_from_run_to_run_moves_both_of_its_parts() -> None:
         plant = rd.Plant(robot, rd.effects.joint_stops([-1.0], [at], 1e3, 1e2))
         return rd.Setup(plant, [0.2], [2.0], duration_s=0.2, record_every_s=0.1, estimate_error=False, method="RK4")
 
-    runs = rd.rollouts(stops(0.5), params={"joint_stops.upper": upper})
+    runs = rd.rollouts(stops(0.5), vary={"joint_stops.upper": upper})
     for k, at in enumerate(upper):
         assert rd.simulate(stops(at)).q[:, 0].max() > at
         alone = rd.rollouts(stops(at), q0=[[0.2]])

@@ -218,7 +218,7 @@ def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> N
         rd.rollouts(plant, [[0.3, 0.2], [0.3, 1.2]], method=method)
     upper = [[1.0, 1.0], [1.0, 0.5]]
     with pytest.raises(QueryError, match=r"q0 of run 1: 'joint_2' is 0\.1 beyond its upper stop"):
-        rd.rollouts(plant, [0.3, 0.6], params={"rigid_stops.upper": upper}, method=method)
+        rd.rollouts(plant, [0.3, 0.6], vary={"rigid_stops.upper": upper}, method=method)
 
 
 @pytest.mark.parametrize("method", ["RK4", "DOP853"])
@@ -228,7 +228,7 @@ def test_rollouts_are_the_runs_of_simulate(method: str) -> None:
     setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_every_s=0.1, engine="compiled", method=method,
                      estimate_error=False)  # fmt: skip
     levels = np.array([[3.0, 1.0], [0.5, 2.0]])
-    runs = rd.rollouts(setup, params={"dry_friction.coulomb": levels})
+    runs = rd.rollouts(setup, vary={"dry_friction.coulomb": levels})
     for i, level in enumerate(levels):
         one = rd.simulate(setup, plant=rd.Plant(ARM, [rd.effects.DryFriction(level), plant.effects[1]]))
         assert runs.q is not None

@@ -76,7 +76,7 @@ def test_each_run_is_that_of_the_effect_with_its_value(effects: Any, scene: Any,
     """In both engines: 1e-12 of positions, 1e-10 of what stiff effects make of them. Rollouts keep no states."""
     works = 1e-11 if effects is DRIVE else 1e-10
     given = {name: np.array(x) for name, x in params.items()}
-    runs = rd.rollouts(setup(effects, scene), params=given, record=("q", "v", "u", "work"))
+    runs = rd.rollouts(setup(effects, scene), vary=given, record=("q", "v", "u", "work"))
     for k in range(2):
         own = setup(changed(effects, given, k), scene)
         alone = rd.simulate(own, engine="interpreted")

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import RobotDynError, export
+from robot_dyn import RobotDynError
 from robot_dyn.foundations import FileKind, QueryError, files, save, target
 from tests.foundations.faults import failing_at, raising
 from tests.simulation.test_run_file import run  # noqa: F401  the fixture
@@ -74,16 +74,15 @@ def test_whichever_call_fails_the_old_file_or_the_new_one_is_whole(tmp_path: Pat
 @pytest.mark.parametrize("what", ["run", "table", "parquet", "nc", "mcap"])
 def test_whatever_is_saved_survives_a_fault_at_each_call(run, tmp_path: Path, what: str) -> None:  # noqa: F811
     """The same through the public functions, whose formats write in many pieces, and close in their own ways."""
-    keep = {"run": (rd.save_run, "x.npz"), "table": (export, "x.csv")}
+    name = {"run": "x.npz", "table": "x.csv"}.get(what, f"x.{what}")
     for package in {"parquet": ["pyarrow"], "nc": ["xarray"], "mcap": ["mcap_ros2"]}.get(what, ()):
         pytest.importorskip(package)
-    function, name = keep.get(what, (export, f"x.{what}"))
-    path = function(run, tmp_path / name)
+    path = run.save(tmp_path / name)
     before = path.read_bytes()
     for k in (*range(1, 12), *range(12, 400, 37)):
         with failing_at(k, raising(OSError(ENOSPC, "full"))) as faults:
             try:
-                function(run, path)
+                run.save(path)
             except RobotDynError as error:
                 assert re.search(r"cannot be (read|written) \(full\)", str(error)), k
             else:
@@ -251,16 +250,16 @@ def test_closed_folders_and_protected_files_are_refused(old: Path, tmp_path: Pat
 
 def test_the_public_functions_replace_their_own_kind_and_no_other(run, tmp_path: Path) -> None:  # noqa: F811
     """As numpy.save replaces; but a scene under a link named run.npz stays."""
-    every = ((rd.save_run, "x.npz"), (export, "x.csv"), (partial(rd.save_plot, dpi=20), "x.png"))
-    every += ((rd.save_replay, "x.html"),)
-    for function, name in every:
-        path = function(run, tmp_path / name)
-        function(run, path)
+    page, figure = rd.replay(run), rd.plot(run)
+    savers = ((run.save, "x.npz"), (run.save, "x.csv"), (partial(figure.save, dpi=20), "x.png"), (page.save, "x.html"))
+    for write, name in savers:
+        path = write(tmp_path / name)
+        write(path)
         path.write_text("robot = 'pendulum'")
         with pytest.raises(RobotDynError, match="so it is not replaced"):
-            function(run, path)
+            write(path)
         with pytest.raises(RobotDynError, match=r"'\.toml' is not the suffix"):
-            function(run, tmp_path / "x.toml")
+            write(tmp_path / "x.toml")
         assert path.read_text() == "robot = 'pendulum'"
 
 
@@ -283,7 +282,7 @@ def test_only_regular_files_are_read(what, message: str) -> None:
     with pytest.raises(QueryError, match=message):
         files.read(what, 10, QueryError, "help")
     with pytest.raises(RobotDynError, match=message.partition(";")[0]):
-        rd.load_run(what)
+        rd.read(what)
 
 
 def test_reads_are_bounded(old: Path) -> None:
@@ -295,4 +294,4 @@ def test_reads_are_bounded(old: Path) -> None:
 
 def test_a_run_that_is_saved_reads_as_it_was(run, tmp_path: Path) -> None:  # noqa: F811
     """The stream that formats write to is the file itself, for seeking too."""
-    np.testing.assert_array_equal(rd.load_run(rd.save_run(run, tmp_path / "x")).q, run.q)
+    np.testing.assert_array_equal(rd.read(run.save(tmp_path / "x")).q, run.q)

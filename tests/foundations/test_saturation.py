@@ -162,7 +162,7 @@ def test_sweeps_of_the_limit_are_cut_as_single_runs_are() -> None:
     plant, options = rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), {"record_every_s": 0.25, "estimate_error": False}
     setup = rd.Setup(plant, START, None, 1.0, controller, **options)
     limits = np.array([[np.inf, np.inf], [18.0, 5.0], [25.0, 8.0]])
-    runs = rd.rollouts(setup, params={"effort_limit.limit": limits})
+    runs = rd.rollouts(setup, vary={"effort_limit.limit": limits})
     for i, limit in enumerate(limits):
         alone = rd.simulate(setup, plant=rd.Plant(ARM, [rd.effects.EffortLimit(limit)]), engine="compiled")
         np.testing.assert_allclose(runs.q[i], alone.q, atol=1e-13)

@@ -64,7 +64,7 @@ def values() -> dict[str, Any]:
         "step_s": 0.01,
     }
     setup = rd.Setup(plant, Q, **options)
-    run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
+    run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], vary={"kp": [1.0, 2.0]})
     loop = rd.control.Loop(
         rd.control.PD(PLAN, [1.0, 2.0], 1.0, 0.01),
         [rd.control.Noise([0.1, 0.2]), rd.control.Quantisation(0.1)],

@@ -57,7 +57,7 @@ def test_tableau_is_checked_when_it_is_made() -> None:
         ButcherTableau(((), (half,)), (half, 1), (0, half), 2)
     with pytest.raises(QueryError, match=r"sum of a\[1\] must be 0.75, got 0.5"):
         ButcherTableau(((), (half,)), (0, 1), (0, 0.75), 2)
-    with pytest.raises(QueryError, match="2 nodes and rows of 2 entries"):
+    with pytest.raises(QueryError, match="2 nodes and rows of up to 2 entries"):
         ButcherTableau(((),), (0, 1), (0, half), 2)
     with pytest.raises(QueryError, match="sum of b"):
         ButcherTableau(((),), (float("nan"),), (0,), 1)
@@ -67,9 +67,9 @@ def test_tableau_is_checked_when_it_is_made() -> None:
 
 def test_an_engine_refuses_a_tableau_it_cannot_run() -> None:
     implicit = ButcherTableau(((1,),), (1,), (1,), 1)
-    with pytest.raises(QueryError, match="i entries at most"):
+    with pytest.raises(QueryError, match="up to i entries"):
         ExplicitRungeKutta("wrong", implicit)
-    with pytest.raises(QueryError, match="give 2, 4 or 6"):
+    with pytest.raises(QueryError, match="must be 2, 4 or 6"):
         GaussLegendre(3)
 
 
@@ -147,7 +147,7 @@ def test_implicit_methods_say_which_floats_they_take(integrator: Integrator) -> 
     states = [Ball().array([1, 0])] + [np.ones(2, np.longdouble)] * (not integrator.plain)
     for y in states:
         if y.dtype != np.float64:
-            with pytest.raises(QueryError, match="works in float"):
+            with pytest.raises(QueryError, match="supports float"):
                 integrator.step(OSCILLATOR, 0.0, y, 0.1)
 
 

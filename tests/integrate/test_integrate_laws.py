@@ -113,7 +113,7 @@ def test_jacobian_of_a_batch() -> None:
 def test_gauss_says_when_the_step_is_too_large(order: int) -> None:
     for h in (5.0, 50.0):
         with pytest.raises(
-            IntegrationError, match=rf"GaussLegendre{order}: .* at t = 0.3 .* take a smaller step"
+            IntegrationError, match=rf"GaussLegendre{order}: .* at t = 0.3 .* use a smaller step"
         ) as caught:
             GaussLegendre(order).step(OSCILLATOR, 0.3, np.array([1.0, 0.5]), h)
         assert caught.value.t == 0.3

@@ -305,7 +305,7 @@ def test_runs_in_lock_step_are_those_of_simulate() -> None:
     starts, damping = rng.normal(size=(70, 2)), 10 ** rng.uniform(-1, 5, (70, 2))
     friction = rd.effects.RegularisedCoulombFriction([1.0, 0.6], 0.1)
     plant = rd.Plant(ARM, [friction, rd.effects.ViscousFriction(1.0)])
-    runs = rd.rollouts(plant, starts, params={"viscous_friction.viscous": damping}, **options)
+    runs = rd.rollouts(plant, starts, vary={"viscous_friction.viscous": damping}, **options)
     assert runs.q is not None
     assert not runs.diverged.any()
     for i in (0, 35, 69):

@@ -354,7 +354,7 @@ def test_a_loop_of_a_scene_is_that_of_python(write, tmp_path: Path) -> None:
     one, two = rd.simulate(setup), rd.simulate(setup, controller=by_hand())
     np.testing.assert_array_equal(one.q, two.q)
     np.testing.assert_array_equal(one.controller_states, two.controller_states)
-    saved = rd.load_run(rd.save_run(one, tmp_path / "run"))
+    saved = rd.read(one.save(tmp_path / "run"))
     np.testing.assert_array_equal(saved.controller_states, one.controller_states)
 
 

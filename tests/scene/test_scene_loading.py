@@ -53,7 +53,7 @@ def test_inertias_from_shapes_are_those_of_load(key: str, tmp_path: Path) -> Non
 def test_what_is_estimated_is_told_by_run_file_and_explanation(tmp_path: Path) -> None:
     path = scene(tmp_path, "rig.urdf", LOAD["total"][0])
     run = rd.simulate(rd.read_scene(path))
-    again = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
+    again = rd.read(run.save(tmp_path / "run.npz"))
     for text in (run.summary, again.summary, repr(rd.explain(path))):
         assert "links 'one', 'two': mass or inertia is estimated from shapes, not measured" in text
 
@@ -63,7 +63,7 @@ def test_what_is_left_out_of_mjcf_is_told_by_run_file_batch_and_explanation(tmp_
     path = scene(tmp_path, "rig.xml", 'without = ["tendon"]')
     setup = rd.read_scene(path)
     run = rd.simulate(setup)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
+    again = rd.read(run.save(tmp_path / "run.npz"))
     for text in (run.summary, again.summary, rd.rollouts(setup, q0=Q[None]).summary, repr(rd.explain(path))):
         assert "tendon 'cable': tendons are not supported; left out" in text
     with pytest.raises(SceneError, match=r"tendon 'cable'.*without=\{'tendon'\}"):

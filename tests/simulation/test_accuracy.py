@@ -158,7 +158,7 @@ def test_it_is_kept_with_the_run_and_asked_for_in_scenes(tmp_path: Path) -> None
     scene.write_text('robot = "planar_2r"\nduration_s = 0.3\naccuracy = 1e-7\n[[effect]]\nkind = "gravity"\n')
     run = rd.simulate(rd.read_scene(scene))
     assert run.accuracy.requested == 1e-7
-    kept = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
+    kept = rd.read(run.save(tmp_path / "run.npz"))
     assert kept.accuracy == run.accuracy
     scene.write_text(scene.read_text().replace("accuracy", 'method = "RK4"\naccuracy'))
     with pytest.raises(SceneError, match="method: has no effect because accuracy chooses"):

@@ -29,7 +29,7 @@ def test_gains_of_an_arm_from_stable_to_unstable_give_the_reasons_of_single_runs
     law = rd.control.PD(rd.control.hold(q0 + 0.2), 1.0, 0.05, period)
     setup = rd.Setup(rd.Plant(arm), q0, duration_s=1.0, controller=law, method="RK4", step_s=2e-3)
     factors = np.geomspace(1.0, 1e5, 6)
-    runs = rd.rollouts(setup, params={"kp": factors, "kd": 0.05 * factors})
+    runs = rd.rollouts(setup, vary={"kp": factors, "kd": 0.05 * factors})
     reasons = reasons_of(runs)
     cause = Reason.CONTROL_LOOP_UNSTABLE if period else Reason.STEP_TOO_LONG
     assert reasons[0] is Reason.END and reasons[-1] is cause
@@ -42,7 +42,7 @@ def test_steps_just_above_the_longest_stable_one_are_the_reason() -> None:
     parts = np.array([0.9, 0.97, 1.03])
     law = rd.control.PD(rd.control.hold([0.0]), 0.0, 1.0)
     setup = rd.Setup(rd.Plant(joint), [0.1], [1.0], duration_s=5000 * step, controller=law, method="RK4", step_s=step)
-    runs = rd.rollouts(setup, params={"kd": STABLE * INERTIA / step * parts})
+    runs = rd.rollouts(setup, vary={"kd": STABLE * INERTIA / step * parts})
     assert reasons_of(runs) == [Reason.END, Reason.END, Reason.STEP_TOO_LONG]
     assert runs.diverged.tolist() == [False, False, True]
     assert runs.table()["reason"].tolist() == [str(outcome.reason) for outcome in runs.outcomes]
@@ -65,8 +65,8 @@ def test_the_reason_of_a_run_does_not_depend_on_its_neighbours(tmp_path) -> None
     law = rd.control.PD(rd.control.hold([0.0, 0.0]), 10.0, 1.0, 0.01)
     setup = rd.Setup(rd.Plant(arm), q0, duration_s=3.0, controller=law, method="RK4", step_s=0.01)
     kd = np.full(70, 200.0)
-    runs, alone = rd.rollouts(setup, params={"kd": kd}), rd.rollouts(setup, params={"kd": kd[:1]})
+    runs, alone = rd.rollouts(setup, vary={"kd": kd}), rd.rollouts(setup, vary={"kd": kd[:1]})
     assert set(map(str, runs.outcomes)) == {str(alone.outcome(0))}
     assert alone.outcome(0).reason is Reason.CONTROL_LOOP_UNSTABLE
-    back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs"))
+    back = rd.read(runs.save(tmp_path / "runs"))
     assert back.outcomes == runs.outcomes

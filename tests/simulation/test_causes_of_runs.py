@@ -121,7 +121,7 @@ def test_a_stop_bears_what_friction_does_not() -> None:
 def test_causes_are_kept_in_run_files(tmp_path) -> None:
     """A file holds what effects exerted, so that a run is split where its plant is not known."""
     run = rd.simulate(plants()["LuGre"], [0.3, 0.4], [1.0, -0.5], duration_s=0.2, controller=pull)
-    again = rd.load_run(rd.save_run(run, tmp_path / "run.npz")).causes()
+    again = rd.read(run.save(tmp_path / "run.npz")).causes()
     for name, torque in run.causes().torques.items():
         np.testing.assert_array_equal(again.torques[name], torque)
 

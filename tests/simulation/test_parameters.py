@@ -101,9 +101,9 @@ def test_another_structure_is_compiled() -> None:
 def test_every_number_is_a_sweep_parameter(name: str, values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each run is that of the setup with this value; other values of what is swept compile nothing."""
     base = replace(setup(0.0), record_every_s=0.02)
-    rd.rollouts(base, params={name: values[::-1] + 0.01})
+    rd.rollouts(base, vary={name: values[::-1] + 0.01})
     compiles_nothing(monkeypatch)
-    runs = rd.rollouts(base, params={name: values})
+    runs = rd.rollouts(base, vary={name: values})
     monkeypatch.undo()
     for i in range(2):
         own = with_value(base, name, values[i])
@@ -138,13 +138,13 @@ def with_value(base: rd.Setup, name: str, value: np.ndarray) -> rd.Setup:
 def test_sweeps_are_held_to_what_is_declared() -> None:
     base = setup(0.0)
     for params, message in (
-        ({"kp": [-1.0]}, "params: kp must not be negative"),
-        ({"gravity": [[0.0, 0.0]]}, r"params: gravity must have shape \(B, 3\)"),
+        ({"kp": [-1.0]}, "vary: kp must not be negative"),
+        ({"gravity": [[0.0, 0.0]]}, r"vary: gravity must have shape \(B, 3\)"),
         ({"viscous_friction.viscou": [1.0]}, "no 'viscous_friction.viscou'; nearest: viscous_friction.viscous"),
         ({"external_wrench.start_s": [0.1]}, "no 'external_wrench.start_s'"),
     ):
         with pytest.raises(QueryError, match=message):
-            rd.rollouts(base, params=params)
+            rd.rollouts(base, vary=params)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +184,7 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
     theirs = rd.simulate(base, engine="interpreted")
     assert np.abs(rd.simulate(base, engine="compiled").q - theirs.q).max() < 1e-12
     assert theirs.desired is not None and np.abs(theirs.desired - path.at(theirs.t)[0]).max() == 0
-    runs = rd.rollouts(base, params={"gain": [50.0, 20.0], "drag.strength": [[0.0, 0.5], [0.3, 0.1]]})
+    runs = rd.rollouts(base, vary={"gain": [50.0, 20.0], "drag.strength": [[0.0, 0.5], [0.3, 0.1]]})
     assert np.abs(runs.q[0] - theirs.q).max() < 1e-12 < np.abs(runs.q[1] - theirs.q).max()
 
 

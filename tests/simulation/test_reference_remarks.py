@@ -84,7 +84,7 @@ def test_a_batch_tells_in_which_runs_a_joint_is_held_or_the_reference_jumps() ->
     law = rd.control.PD(rd.control.quintic([-0.2], [0.3], 0.4), 9.0, 0.0)
     setup = rd.Setup(rd.Plant(still, [rd.effects.DryFriction(5.0)]), [-0.2], duration_s=0.6, controller=law)
     starts, stiffness = np.array([[-0.2], [-0.2], [-0.1], [-0.35]]), np.array([9.0, 14.0, 9.5, 8.0])
-    runs = rd.rollouts(setup, starts, params={"kp": stiffness}, engine="interpreted")
+    runs = rd.rollouts(setup, starts, vary={"kp": stiffness}, engine="interpreted")
     said = {each.kind: each for each in runs.remarks if each.kind in (RemarkKind.JUMPS, RemarkKind.HELD)}
     assert said[RemarkKind.JUMPS].runs == (3, 2) and "joint_2 from -0.35 to -0.2 rad" in said[RemarkKind.JUMPS].text
     assert said[RemarkKind.HELD].runs == (0, 2) and said[RemarkKind.HELD].looked == 4

@@ -245,14 +245,14 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     told = json.loads(json_text(report.run(run)))
     assert [each["text"] for each in told["remarks"]] == [remark.text for remark in run.remarks]
     assert told["extremes"]["u"] == {"least": [-LIMIT], "largest": [LIMIT]}
-    back = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    back = rd.read(run.save(tmp_path / "run"))
     assert back.remarks == run.remarks
     np.testing.assert_array_equal(back.extremes, run.extremes)
 
 
 def test_a_run_that_was_not_watched_says_so(joint, tmp_path) -> None:
     run = replace(rd.simulate(damped(joint, 0.5)), extremes=None, remarks=())
-    assert "not observed" in rd.load_run(rd.save_run(run, tmp_path / "run")).summary
+    assert "not observed" in rd.read(run.save(tmp_path / "run")).summary
 
 
 def test_regularised_friction_that_creeps_is_named_with_its_speed(joint) -> None:

@@ -67,19 +67,19 @@ def test_json_holds_fields_and_reported_properties_and_no_number_that_it_lacks()
 
 
 def test_csv_holds_the_rows_and_json_all_of_any_result(tmp_path) -> None:
-    with rd.accuracy.save_result(ODD, tmp_path / "odd").open(encoding="utf-8", newline="") as file:
+    with ODD.save(tmp_path / "odd").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert file.name.endswith("odd.csv")  # there is no figure of it
     assert [(float(row["size"]), float(row["double"])) for row in rows] == [(0.1, 0.2), (inf, inf)]
-    assert json.loads(rd.accuracy.save_result(ODD, tmp_path / "odd.json").read_text(encoding="utf-8")) == plain(ODD)
-    assert rd.accuracy.save_result(ODD, tmp_path / "odd.json").exists()  # it replaces its own kind
+    assert json.loads(ODD.save(tmp_path / "odd.json").read_text(encoding="utf-8")) == plain(ODD)
+    assert ODD.save(tmp_path / "odd.json").exists()  # it replaces its own kind
 
 
 @pytest.mark.parametrize(("name", "content"), [("odd.csv", "price,stock\n1,2"), ("odd.json", '{"robot": 1}')])
 def test_files_of_another_kind_are_not_replaced(tmp_path, name: str, content: str) -> None:
     (tmp_path / name).write_text(content)
     with pytest.raises(ResultError, match="so it is not replaced"):
-        rd.accuracy.save_result(ODD, tmp_path / name)
+        ODD.save(tmp_path / name)
     assert (tmp_path / name).read_text() == content
 
 

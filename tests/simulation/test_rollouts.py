@@ -82,19 +82,19 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
         "one": (SETUP, {"q0": starts(1)}),
         "a tile and a bit more": (SETUP, {"q0": starts(70)}),
         "sampled": (PID, {"q0": starts(70)}),
-        "far": (free, {"q0": far, "params": {f"payload_mass:{ARM_TIP}": [0.5, 1.5, 2.5]}}),
-        "gains and friction": (SETUP, {"params": gains}),
-        "masses": (replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects)), {"params": masses}),
+        "far": (free, {"q0": far, "vary": {f"payload_mass:{ARM_TIP}": [0.5, 1.5, 2.5]}}),
+        "gains and friction": (SETUP, {"vary": gains}),
+        "masses": (replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects)), {"vary": masses}),
         "masses unknown to the model": (
-            replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects), controller=known), {"params": masses},
+            replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects), controller=known), {"vary": masses},
         ),
         "levels": (
-            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, method="RK4", record_every_s=0.1), {"params": levels},
+            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, method="RK4", record_every_s=0.1), {"vary": levels},
         ),
-        "chosen steps": (replace(SETUP, plant=hard, **chosen), {"q0": starts(3), "params": walls}),
+        "chosen steps": (replace(SETUP, plant=hard, **chosen), {"q0": starts(3), "vary": walls}),
         "payloads come and go": (
             replace(SETUP, plant=rd.Plant(ARM, [body]), controller=None),
-            {"params": {"gravity": [[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]]}},
+            {"vary": {"gravity": [[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]]}},
         ),
         "bristles": (
             rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, method="RK4"), {"q0": starts(3, 0.01)},
@@ -154,7 +154,7 @@ def test_the_setup_of_a_run_has_its_values() -> None:
         for i in range(len(runs)):
             own = runs.setup_of(i)
             for key, value in parts(own).items():
-                np.testing.assert_array_equal(value, np.broadcast_to(given["params"][key][i], np.shape(value)))
+                np.testing.assert_array_equal(value, np.broadcast_to(given["vary"][key][i], np.shape(value)))
             assert not name.endswith("model") or own.controller.model == NOMINAL
 
 
@@ -232,7 +232,7 @@ def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
 def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
     """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
     params = {"viscous_friction.viscous": np.array([[0.3, 0.1], [0.7, 0.2], [0.0, 0.4]])}
-    runs = rd.rollouts(setup, starts(3), params=params, record=record)
+    runs = rd.rollouts(setup, starts(3), vary=params, record=record)
     effects = [rd.effects.ViscousFriction(params["viscous_friction.viscous"][-1]), *PLANT.effects[1:]]
     alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
     run = runs[-1]
@@ -258,10 +258,10 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
 
 
 def test_runs_are_numbered_as_lists_are() -> None:
-    runs = rd.rollouts(SETUP, starts(5), params={"kp": np.arange(5.0)})
+    runs = rd.rollouts(SETUP, starts(5), vary={"kp": np.arange(5.0)})
     np.testing.assert_array_equal(runs[-2].q, runs.q[3])
     some = runs[1:4]
-    assert len(some) == 3 and some.params["kp"][0, 0] == 1.0 and len(list(runs)) == 5
+    assert len(some) == 3 and some.varied["kp"][0, 0] == 1.0 and len(list(runs)) == 5
     np.testing.assert_array_equal(some[0].u, runs[1].u)
     with pytest.raises(IndexError, match="no run 5: runs are numbered from 0 to 4"):
         runs[5]
@@ -285,17 +285,24 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
             np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
 
 
-@pytest.mark.parametrize("command", [("replay", "--html", "page.html"), ("plot",)], ids=lambda command: command[0])
+@pytest.mark.parametrize(
+    "command", [("replay", "--html", "page.html"), ("diff", "run.npz")], ids=lambda command: command[0]
+)
 def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
-    """Not that it is damaged; what they advise makes a file that they take."""
+    """A batch is not reported as damaged; the advised remedy makes a file that they accept."""
     monkeypatch.chdir(tmp_path)
-    rd.save_rollouts(rd.rollouts(SETUP, starts(3), V), "runs.npz")
+    rd.rollouts(SETUP, starts(3), V).save("runs.npz")
     text = refusal((command[0], "runs.npz", *command[1:]))
-    assert "is a file of rollouts" in text and "simulate again" not in text
-    rd.save_run(rd.load_rollouts("runs.npz")[0], "run.npz")
-    assert "written: " in said(command[0], "run.npz", *command[1:])
-    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts: rd.load_run reads it"):
-        rd.load_rollouts("run.npz")
+    assert "is a batch of 3 runs" in text and "[0].save(" in text
+    rd.read("runs.npz")[0].save("run.npz")
+    assert said(command[0], "run.npz", *command[1:])
+
+
+def test_the_command_plot_draws_a_batch(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rd.rollouts(SETUP, starts(3), V).save("runs.npz")
+    assert "written: " in said("plot", "runs.npz", "--only", "fan", "--joint", "joint_1")
+    assert (tmp_path / "runs.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("u",)])
@@ -303,35 +310,29 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
     """Bit for bit, and a file that was cut short, or is of another kind, is refused."""
     v0 = np.tile(V, (4, 1))
     v0[2] = 1e5, 3e7
-    runs = rd.rollouts(SETUP, starts(4), v0, params={"kp": np.arange(4.0)}, record=record)
-    path = rd.save_rollouts(runs, tmp_path / "runs")
-    back = rd.load_rollouts(path)
+    runs = rd.rollouts(SETUP, starts(4), v0, vary={"kp": np.arange(4.0)}, record=record)
+    path = runs.save(tmp_path / "runs")
+    back = rd.read(path)
     for x, y in zip(arrays(runs), arrays(back), strict=True):
         np.testing.assert_array_equal(x, y)
     assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
-    assert back.about["urdf"] == runs.about["urdf"] and back.params["kp"][3, 0] == 3.0
-    with pytest.raises(
-        rd.RobotDynError, match=r"is a file of rollouts, which are many runs: rd.load_rollouts reads it"
-    ):
-        rd.load_run(path)
+    assert back.about["urdf"] == runs.about["urdf"] and back.varied["kp"][3, 0] == 3.0
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="cannot be read as a run file"):
-        rd.load_rollouts(path)
-    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with rd\.save_rollouts"):
-        rd.load_rollouts(tmp_path / "none.npz")
-    with pytest.raises(rd.RobotDynError, match="got Rollouts; save_rollouts takes"):
-        rd.save_run(runs, path)
+        rd.read(path)
+    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with run\.save"):
+        rd.read(tmp_path / "none.npz")
 
 
 @pytest.mark.parametrize("read", [False, True])
 def test_a_run_of_a_batch_is_saved_drawn_and_replayed(read: bool, tmp_path: Path) -> None:
     """With what it has: torques and energies that nobody recorded are not drawn."""
     runs = rd.rollouts(PID, starts(2))
-    runs = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs")) if read else runs
+    runs = rd.read(runs.save(tmp_path / "runs")) if read else runs
     run = runs[1]
-    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    again = rd.read(run.save(tmp_path / "run"))
     np.testing.assert_array_equal(again.q, run.q)
-    assert rd.save_replay(run, tmp_path / "run").stat().st_size > 10_000
+    assert rd.replay(run).save(tmp_path / "run").stat().st_size > 10_000
     assert rd.plot(run).axes
     for name in ("torques", "energy"):
         with pytest.raises(rd.RobotDynError, match="not recorded; add"):
@@ -365,25 +366,25 @@ def test_what_has_no_meaning_is_refused() -> None:
         "q0 must be finite, got nan for joint": {"q0": bad},
         r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
         "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
-        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "params": {"kp": ones}},
+        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "vary": {"kp": ones}},
         "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
-        r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"params": {"mass_scale": 1.1}},
-        "no 'kq'; nearest: k": {"params": {"kq": ones}},
-        "no 'viscous_friction.visc'; nearest: viscous_friction.viscous": {"params": {"viscous_friction.visc": ones}},
-        "kp must not be negative": {"params": {"kp": [-1.0]}},
+        r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"vary": {"mass_scale": 1.1}},
+        "no 'kq'; nearest: k": {"vary": {"kq": ones}},
+        "no 'viscous_friction.visc'; nearest: viscous_friction.viscous": {"vary": {"viscous_friction.visc": ones}},
+        "kp must not be negative": {"vary": {"kp": [-1.0]}},
         r"no 'payload_mass:elbow': the arm has no payload; add one with robot.with_\(payload=": {
-            "params": {"payload_mass:elbow": ones}
+            "vary": {"payload_mass:elbow": ones}
         },
-        "velocity_scale": {"params": {"regularised_coulomb_friction.velocity_scale": np.zeros(2)}},
+        "velocity_scale": {"vary": {"regularised_coulomb_friction.velocity_scale": np.zeros(2)}},
         r"several effects of the plant; give 'viscous_friction 1\.viscous' and 'visc": {
-            "plant": two, "params": {"viscous_friction.viscous": ones},
+            "plant": two, "vary": {"viscous_friction.viscous": ones},
         },
-        "params must give values by name, such as": {"params": [1]},
-        "params must give values by name, .*3": {"params": {3: ones}},
+        "vary must give values by name, such as": {"vary": [1]},
+        "vary must give values by name, .*3": {"vary": {3: ones}},
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
         r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
-            "q0": starts(4), "most_bytes": 100,
+            "q0": starts(4), "max_bytes": 100,
         },
     }.items():  # fmt: skip
         with pytest.raises(rd.RobotDynError, match=message):
@@ -396,7 +397,7 @@ def test_a_batch_of_the_engine_that_is_named_is_that_of_simulate() -> None:
     """Interpreted, to the last bit; also of a part that cannot be compiled."""
     for effects in (PLANT.effects, [Table()]):
         setup = replace(SETUP, plant=rd.Plant(ARM, effects), engine="interpreted", estimate_error=False)
-        runs = rd.rollouts(setup, starts(2), params={"kp": [40.0, 30.0]}, record=("q", "u"))
+        runs = rd.rollouts(setup, starts(2), vary={"kp": [40.0, 30.0]}, record=("q", "u"))
         alone = rd.simulate(setup, q0=starts(2)[1], controller=replace(setup.controller, kp=30.0))
         np.testing.assert_array_equal(runs.q[1], alone.q)
         np.testing.assert_array_equal(runs.u[1], alone.u)
@@ -435,7 +436,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
     q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
     for method in ("RK4", "DOP853"):
         runs = rd.rollouts(setup, q0, 0 * q0, method=rd.integrate.method(method) if method == "RK4" else method)
-        back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / method))
+        back = rd.read(runs.save(tmp_path / method))
         for i in range(3):
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
             assert runs.outcome(i).ending == alone.outcome.ending == "finished" and back.outcome(i) == runs.outcome(i)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import export
 from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import RemarkKind, remark_lines
 from robot_dyn.simulation.dynamics.stability import after, shown
@@ -73,7 +72,7 @@ def batch(request) -> tuple[rd.Rollouts, list]:
     """A batch, and each of its runs by itself."""
     given, params = SCENES[request.param]
     q0 = Q + 0.2 * np.random.default_rng(4).normal(size=(B, 2))
-    runs = rd.rollouts(given, q0, params=params)
+    runs = rd.rollouts(given, q0, vary=params)
     return runs, [rd.simulate(runs.setup_of(i), estimate_error=False, engine="compiled") for i in range(B)]
 
 
@@ -157,7 +156,7 @@ def test_tracking_errors_are_those_of_simulate(batch) -> None:
 def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
     """A slice tells what a batch of its runs would; runs that were read tell it without their setup."""
     runs, _ = batch
-    back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs"))
+    back = rd.read(runs.save(tmp_path / "runs"))
     assert back.remarks == runs.remarks and back.worst == runs.worst
     np.testing.assert_array_equal(back.rms_tracking_error, runs.rms_tracking_error)
     for some in (runs[1:4], back[1:4]):
@@ -175,7 +174,7 @@ def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
 def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     """Parameters, outcomes, tracking errors, remarks and extremes, read back as text; another kind of file is kept."""
     runs, _ = batch
-    path = export(runs, tmp_path / "table")
+    path = runs.save(tmp_path / "table.csv")
     rows = [*csv.DictReader(path.read_text(encoding="utf-8").splitlines())]
     assert [row["run"] for row in rows] == [str(i) for i in range(B)]
     of_slide = [float(row["largest u slide [N]"]) for row in rows]
@@ -190,13 +189,13 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
         about = {f"{kind} {quantity} {joint}" for kind, joint, quantity in told(runs[i])}
         assert about <= set(row["remarks"].split("; "))
     with pytest.raises(rd.RobotDynError, match=r"table\.csv"):
-        export(runs[0], path)
+        runs[0].save(path)
 
 
 def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
     """The remark that `simulate` makes on that run, told of it alone."""
     given, params = SCENES["chattering"]
-    runs = rd.rollouts(given, params=params)
+    runs = rd.rollouts(given, vary=params)
     remark, theirs = (
         next(each for each in of.remarks if each.kind is RemarkKind.UNSTABLE)
         for of in (runs, rd.simulate(runs.setup_of(runs.worst), estimate_error=False, engine="compiled"))
@@ -226,7 +225,7 @@ def test_tracking_errors_of_a_frame() -> None:
 def test_a_batch_of_one_speaks_of_a_run() -> None:
     """Its lines are those of the run: there is no other to count, nor one that was not looked at."""
     given, params = SCENES["chattering"]
-    runs = rd.rollouts(given, params={name: x[:1] for name, x in params.items()})
+    runs = rd.rollouts(given, vary={name: x[:1] for name, x in params.items()})
     alone = rd.simulate(runs.setup_of(0), estimate_error=False, engine="compiled")
     assert runs.summary.startswith("1 run of 9 samples to t = 0.8 s; 0 diverged, 0 stopped\n")
     theirs = remark_lines(each for each in alone.remarks if each.kind in (*COUNTED, RemarkKind.UNSTABLE))

@@ -48,8 +48,8 @@ def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
 
     The URDF, the edits, the scene and the versions travel with the numbers.
     """
-    back = rd.load_run(rd.save_run(run, tmp_path / "run"))
-    again = rd.load_run(rd.save_run(back, tmp_path / "again"))
+    back = rd.read(run.save(tmp_path / "run"))
+    again = rd.read(back.save(tmp_path / "again"))
     assert (back.about["file"], again.about["file"]) == ("run.npz", "again.npz")
     texts = {name: text for name, text in back.about.items() if name != "file"}
     assert_same(replace(back, about=texts | {"source": run.about["source"]}), run)
@@ -60,24 +60,24 @@ def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
 
 @pytest.mark.parametrize("keep", [0.0, 0.3, 0.99, "hello", None])
 def test_files_that_are_cut_short_or_of_another_kind_are_refused(run, tmp_path, keep: Any) -> None:
-    path = rd.save_run(run, tmp_path / "run.npz")
+    path = run.save(tmp_path / "run.npz")
     if keep is None:
         np.savez(path, x=np.ones(3))
     else:
         whole = path.read_bytes()
         path.write_bytes(keep.encode() if isinstance(keep, str) else whole[: int(keep * len(whole))])
     with pytest.raises(RunFileError, match="cannot be read as a run file"):
-        rd.load_run(path)
+        rd.read(path)
 
 
 def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:
     """Any byte may be wrong: the file is refused, or what is read is what was written."""
-    path = rd.save_run(run, tmp_path / "run.npz")
+    path = run.save(tmp_path / "run.npz")
     whole = path.read_bytes()
     for i in range(0, len(whole), max(1, len(whole) // 300)):
         path.write_bytes(whole[:i] + bytes([whole[i] ^ 0xFF]) + whole[i + 1 :])
         try:
-            back = rd.load_run(path)
+            back = rd.read(path)
         except RunFileError:
             continue
         assert np.array_equal(back.q, run.q)
@@ -85,7 +85,7 @@ def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:
 
 def resaved(run, path, **changes):
     """Write a run file by NumPy, with members changed, or left out if None."""
-    with np.load(rd.save_run(run, path)) as file:
+    with np.load(run.save(path)) as file:
         arrays = dict(file)
     for name, change in changes.items():
         x = change(arrays.get(name, np.zeros(0)))
@@ -114,7 +114,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("q", lambda q: q.astype(complex), "'q': contains complex128"),
         ("q", lambda q: q.astype(str), "'q': contains str"),
         ("q", lambda q: q.astype(np.float32), "'q': contains float32"),
-        ("q", lambda q: np.where(q > 0, np.inf, q), "member 'q' of a run that did not diverge holds nan or inf"),
+        ("q", lambda q: np.where(q > 0, np.inf, q), "member 'q' of a run that did not diverge contains nan or inf"),
         ("ledger/kinetic", lambda K: K[:5], "'ledger/kinetic': contains"),
         ("power/control", lambda _: None, "'power/control': its array is missing"),
         ("desired", lambda _: np.zeros(3), "'desired' is unknown to this version"),
@@ -151,25 +151,23 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
 def test_members_that_do_not_fit_together_are_refused_by_name(run, tmp_path, name: str, change, message: str) -> None:
     path = resaved(run, tmp_path / "run.npz", **{name: change})
     with pytest.raises(RunFileError, match=f"cannot be read as a run file: .*{message}"):
-        rd.load_run(path)
+        rd.read(path)
 
 
 def test_a_run_that_diverged_keeps_its_nans(run, tmp_path) -> None:
     """What a diverged run ends with may be anything; so a run that NumPy wrote again by itself still loads."""
     end = replace(run, outcome=Outcome(Reason.STATE_OVERFLOWS, 0.2), q=np.where(run.q > 0, np.nan, run.q))
-    path = rd.save_run(end, tmp_path / "run.npz")
-    np.testing.assert_array_equal(rd.load_run(path).q, end.q)
+    path = end.save(tmp_path / "run.npz")
+    np.testing.assert_array_equal(rd.read(path).q, end.q)
     with np.load(path) as file:
         np.savez(tmp_path / "again.npz", **dict(file))
-    np.testing.assert_array_equal(rd.load_run(tmp_path / "again.npz").q, end.q)
+    np.testing.assert_array_equal(rd.read(tmp_path / "again.npz").q, end.q)
 
 
 @pytest.mark.parametrize("change", [{"q": np.zeros(3)}, {"power": {}}, {"joint_names": ("a", "\ud800")}, {"t": [0.0]}])
 def test_what_would_not_be_read_is_not_written(run, tmp_path, change) -> None:
     with pytest.raises(RunFileError, match="cannot be written"):
-        rd.save_run(replace(run, **change), tmp_path / "run.npz")
-    with pytest.raises(RunFileError, match=r"takes the Trajectory of rd\.simulate, got dict"):
-        rd.save_run({}, tmp_path / "run.npz")  # type: ignore[arg-type]
+        replace(run, **change).save(tmp_path / "run.npz")
     assert not list(tmp_path.iterdir())
 
 
@@ -177,7 +175,7 @@ def with_member(run, path, size: int, shape: tuple[int, ...]):
     """Write a run file with a further member of `size` zeros whose header states a shape of float64."""
     data = np.lib.format.header_data_from_array_1_0(np.zeros(0)) | {"shape": shape}
     with (
-        zipfile.ZipFile(rd.save_run(run, path), "a", zipfile.ZIP_DEFLATED) as file,
+        zipfile.ZipFile(run.save(path), "a", zipfile.ZIP_DEFLATED) as file,
         file.open("power/more.npy", "w") as member,
     ):
         np.lib.format.write_array_header_1_0(member, data)
@@ -200,7 +198,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(run, tmp_path, size, shape, mes
     path = with_member(run, tmp_path / "run.npz", size, shape)
     tracemalloc.start()
     with pytest.raises(RunFileError, match=message):
-        rd.load_run(path)
+        rd.read(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 8 * 2**20
@@ -210,16 +208,36 @@ def test_runs_of_zeros_are_saved_and_loaded(tmp_path) -> None:
     """The reader's bound for bombs refuses no file of the writer, however well its arrays compress."""
     plant = rd.Plant(rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)), [])
     runs = rd.rollouts(plant, np.zeros((100, 2)), duration_s=1.0, method="RK4", step_s=1e-3)
-    back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs"))
+    back = rd.read(runs.save(tmp_path / "runs"))
     assert runs.q is not None and back.q is not None
     assert not runs.q.any() and np.array_equal(back.q, runs.q)
 
 
 def test_a_file_with_two_members_of_one_name_is_refused(run, tmp_path: Path) -> None:
     """Otherwise the last one would replace the array of the run in silence."""
-    path, stream = rd.save_run(run, tmp_path / "run.npz"), io.BytesIO()
+    path, stream = run.save(tmp_path / "run.npz"), io.BytesIO()
     np.save(stream, run.q + 1.0)
     with zipfile.ZipFile(path, "a") as file:
         file.writestr("q", stream.getvalue())
     with pytest.raises(RunFileError, match="two members of one name"):
-        rd.load_run(path)
+        rd.read(path)
+
+
+@pytest.mark.parametrize("name", ["scene.toml", "arm.urdf", "run.csv", "notes.txt"])
+def test_other_files_are_not_read_as_runs(run, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    if name == "run.csv":
+        run.save(path)
+    else:
+        path.write_text("robot = 'pendulum'")
+    for other in (path, tmp_path, tmp_path / "none.npz"):
+        with pytest.raises(RunFileError):
+            rd.read(other)
+
+
+def test_a_suffix_without_a_format_is_refused_with_those_that_have_one(run, tmp_path: Path) -> None:
+    with pytest.raises(RunFileError, match=r"\.npz, \.csv, \.parquet, \.nc, \.mcap"):
+        run.save(tmp_path / "run.xlsx")
+    with pytest.raises(rd.RobotDynError, match=r"\.png, \.svg, \.pdf"):
+        rd.plot(run).save(tmp_path / "run.xlsx")
+    assert not list(tmp_path.iterdir())

@@ -25,7 +25,7 @@ def run() -> rd.Trajectory:
 def batch() -> rd.Rollouts:
     """Three runs, one of which diverges."""
     setup = replace(SETUP, method="RK4", step_s=5e-3, record_every_s=5e-3)
-    runs = rd.rollouts(setup, params={"kp": [90.0, 45.0, 1e8]}, record=("q", "v", "u", "energy", "work"))
+    runs = rd.rollouts(setup, vary={"kp": [90.0, 45.0, 1e8]}, record=("q", "v", "u", "energy", "work"))
     assert runs.diverged.tolist() == [False, False, True]
     return runs
 
@@ -90,7 +90,7 @@ def test_what_was_swept_has_its_unit() -> None:
     }
     arm = rd.load("planar_2r").with_(payload=rd.Payload("tip", 0.1))
     plant = rd.Plant(arm, [rd.effects.ViscousFriction([0.4, 0.05])])
-    table = rd.rollouts(plant, [0.3, 0.2], params=params, duration_s=0.01).table()
+    table = rd.rollouts(plant, [0.3, 0.2], vary=params, duration_s=0.01).table()
     damping = [f"viscous_friction.viscous {name} [N m s/rad]" for name in arm.joint_names]
     gravity = [f"gravity {k} [m/s²]" for k in (1, 2, 3)]
     assert list(table)[1:8] == ["payload_mass:tip [kg]", *damping, "mass_scale", *gravity]
@@ -99,7 +99,7 @@ def test_what_was_swept_has_its_unit() -> None:
 
 
 def test_a_run_that_recorded_nothing_has_no_rms() -> None:
-    runs = rd.rollouts(replace(SETUP, method="RK4"), record=("q",), params={"kp": [90.0, 45.0]})
+    runs = rd.rollouts(replace(SETUP, method="RK4"), record=("q",), vary={"kp": [90.0, 45.0]})
     assert not [heading for heading in runs.table() if heading.startswith(("rms v", "rms u"))]
 
 

@@ -320,7 +320,7 @@ def test_what_was_not_read_is_copied_pickled_and_saved_with_the_run(name: str, t
     reference = at_once(setup)
     for made in (copy, deepcopy, lambda run: pickle.loads(pickle.dumps(run)), replace):
         assert_same_run(made(rd.simulate(setup)), reference)
-    back = rd.load_run(rd.save_run(rd.simulate(setup), tmp_path / "run.npz"))
+    back = rd.read(rd.simulate(setup).save(tmp_path / "run.npz"))
     assert back.remarks == reference.remarks and back.summary.split("time:")[0] == reference.summary.split("time:")[0]
 
 

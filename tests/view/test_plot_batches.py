@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import plot, save_plot
+from robot_dyn import plot
 from robot_dyn.foundations import QueryError
 from robot_dyn.view import PlotError
 from robot_dyn.view.plots.batch import BATCH_PLOTS, LEVELS
@@ -27,7 +27,7 @@ def batch(fast: float) -> rd.Rollouts:
     q0 = Q + 0.3 * np.random.default_rng(3).normal(size=(COUNT, 2))
     v0 = np.full((COUNT, 2), 0.3)
     v0[LOST] = [0.01 * fast, fast] if fast else 0.3
-    return rd.rollouts(setup, q0, v0, params={"kp": np.linspace(20.0, 80.0, COUNT)})
+    return rd.rollouts(setup, q0, v0, vary={"kp": np.linspace(20.0, 80.0, COUNT)})
 
 
 @pytest.fixture(scope="module")
@@ -93,11 +93,11 @@ def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> Non
     (axes,) = plot(some_lost, "scatter").axes
     assert axes.get_title(loc="left") == "37 runs; 3 of 40 diverged"
     (crosses,) = lines(axes, "diverged (3)")
-    np.testing.assert_array_equal(crosses.get_xdata(), some_lost.params["kp"][LOST, 0])
+    np.testing.assert_array_equal(crosses.get_xdata(), some_lost.varied["kp"][LOST, 0])
 
 
 def test_a_batch_of_which_all_diverged_is_drawn(some_lost, tmp_path) -> None:
-    save_plot(some_lost[5:6], tmp_path / "lost.png", "fan", "outcomes", "scatter", x="start q joint_1", dpi=40)
+    plot(some_lost[5:6], "fan", "outcomes", "scatter", x="start q joint_1").save(tmp_path / "lost.png", dpi=40)
     with pytest.raises(PlotError, match="no run that did not diverge"):
         plot(some_lost[5:6], "histogram")
 
@@ -108,7 +108,7 @@ def test_columns_are_those_of_the_table_with_their_units(runs) -> None:
     (axes,) = plot(runs, "scatter").axes
     assert axes.get_xlabel() == "kp joint_1 [N m/rad]" and axes.get_ylabel().startswith("rms tracking error [")
     np.testing.assert_array_equal(
-        axes.lines[0].get_xydata(), np.column_stack([runs.params["kp"][:, 0], runs.rms_tracking_error])
+        axes.lines[0].get_xydata(), np.column_stack([runs.varied["kp"][:, 0], runs.rms_tracking_error])
     )
     (axes,) = plot(runs, "scatter", x="start q joint_2", y="largest v joint_1 [rad/s]").axes
     expected = np.column_stack([runs.q0[:, 1], table["largest v joint_1 [rad/s]"]])
@@ -126,7 +126,7 @@ def test_all_parts_fit_a_page_and_are_named(some_lost, tmp_path) -> None:
     for name in BATCH_PLOTS:
         for suffix in (".png", ".svg", ".pdf"):
             assert (
-                save_plot(some_lost, tmp_path / f"{name}{suffix}", name, joints="joint_2", dpi=30).stat().st_size > 1000
+                plot(some_lost, name, joints="joint_2").save(tmp_path / f"{name}{suffix}", dpi=30).stat().st_size > 1000
             )
 
 

@@ -16,7 +16,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 import robot_dyn as rd
-from robot_dyn import plot, save_plot
+from robot_dyn import plot
 from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import Doubt, DoubtKind, Ledger, Outcome, Reason
 from robot_dyn.view import PLOTS, PlotError
@@ -241,7 +241,7 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     names = (r"$\frac", "_first", "a_b^{c$x$", "関節", "arm_" + "x" * 200 + "_end", "per%cent #1")
     sources = {r"_$\sum$": run.ledger.kinetic, "control": run.ledger.kinetic}
     hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), about={})
-    save_plot(hostile, tmp_path / "names.png", dpi=40)  # warnings are errors
+    plot(hostile).save(tmp_path / "names.png", dpi=40)  # warnings are errors
     titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
     assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]
     long_name = titles[4].replace("\n", "")
@@ -253,19 +253,19 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     "suffix, opening", [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".PDF", b"%PDF"), ("", b"\x89PNG")]
 )
 def test_the_suffix_says_the_format(cart, tmp_path, suffix: str, opening: bytes) -> None:
-    path = save_plot(cart, tmp_path / f"plot{suffix}", "joints", dpi=40, theme="dark")
+    path = plot(cart, "joints", theme="dark").save(tmp_path / f"plot{suffix}", dpi=40)
     assert path.read_bytes().startswith(opening) and path.suffix == (suffix or ".png")
 
 
 def test_targets_that_cannot_be_written_are_refused(cart, tmp_path) -> None:
     with pytest.raises(PlotError, match=r"'.jpeg' is not the suffix of a plot; .*\.png, \.svg, \.pdf"):
-        save_plot(cart, tmp_path / "plot.jpeg")
+        plot(cart).save(tmp_path / "plot.jpeg")
     with pytest.raises(PlotError, match="is a folder"):
-        save_plot(cart, tmp_path)
+        plot(cart).save(tmp_path)
     with pytest.raises(PlotError, match="there is no folder"):
-        save_plot(cart, tmp_path / "no folder" / "plot.png", "joints", dpi=40)
+        plot(cart, "joints").save(tmp_path / "no folder" / "plot.png", dpi=40)
     with pytest.raises(PlotError, match="cannot be drawn at 50000 dpi"):
-        save_plot(cart, tmp_path / "plot.png", "joints", dpi=50_000)
+        plot(cart, "joints").save(tmp_path / "plot.png", dpi=50_000)
 
 
 @pytest.mark.parametrize("size", [1e308, 5e-324])
@@ -285,7 +285,7 @@ def test_a_run_without_samples_is_refused(cart) -> None:
 
 def test_a_run_of_one_sample_is_a_point(cart, tmp_path) -> None:
     one = stretched(cart, 1)
-    save_plot(one, tmp_path / "one.png", dpi=40)
+    plot(one).save(tmp_path / "one.png", dpi=40)
     assert {line.get_marker() for axes in cells(plot(one, "joints"), "q") for line in axes.lines} == {"o"}
 
 
@@ -297,13 +297,13 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     end = Outcome(Reason.STATE_OVERFLOWS, 5.0)
     fast = {"q": growth, "v": growth, "u": growth, "ledger": energy, "outcome": end}
     run = stretched(cart, 200, **fast, tracking_error=growth, desired=growth)
-    save_plot(run, tmp_path / "diverged.png", dpi=40)
+    plot(run).save(tmp_path / "diverged.png", dpi=40)
     figure = plot(run)
     assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
     assert {axes.get_yscale() for axes in cells(figure, "q")} == {"symlog"}
     assert end.text in headings(figure)
     nothing = np.full((200, 2), np.nan)
-    save_plot(stretched(run, 200, q=nothing, v=nothing, u=nothing), tmp_path / "nan.png", dpi=40)
+    plot(stretched(run, 200, q=nothing, v=nothing, u=nothing)).save(tmp_path / "nan.png", dpi=40)
 
 
 def test_a_long_run_is_thinned_and_keeps_its_peaks(run) -> None:
@@ -428,9 +428,9 @@ def test_a_paper_has_no_title_thin_lines_and_dashes_that_differ(run) -> None:
 @pytest.mark.parametrize(("suffix", "page"), [(".svg", b'width="340.157'), (".pdf", b"340.157")])
 def test_vector_files_have_the_width(run, tmp_path, suffix: str, page: bytes) -> None:
     """120 mm are 340.157 pt; a PNG has them by its dots."""
-    path = save_plot(run, tmp_path / f"run{suffix}", "torques", width_mm=120, style="paper")
+    path = plot(run, "torques", width_mm=120, style="paper").save(tmp_path / f"run{suffix}")
     assert page in path.read_bytes() and b"<image" not in path.read_bytes()
-    png = save_plot(run, tmp_path / "run.png", "torques", width_mm=127, dpi=100).read_bytes()
+    png = plot(run, "torques", width_mm=127).save(tmp_path / "run.png", dpi=100).read_bytes()
     assert int.from_bytes(png[16:20], "big") == 500
 
 

@@ -161,8 +161,8 @@ def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path
     other = rd.simulate(
         rd.Plant(arm, [rd.effects.ViscousFriction(5.0)]), q0=UR5_Q, duration_s=0.8, estimate_error=False
     )
-    alone = rd.save_replay(fall, tmp_path / "alone.html").stat().st_size
-    both = rd.save_replay(fall, tmp_path / "both.html", other)
+    alone = rd.replay(fall).save(tmp_path / "alone.html").stat().st_size
+    both = rd.replay(fall, other).save(tmp_path / "both.html")
     assert both.stat().st_size < 1.2 * alone
     with opened(browser, both) as view:
         view.ask("(replay.seek(0.7), 0)")
@@ -242,7 +242,7 @@ def swing():
 
 
 def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
-    file = rd.save_run(swing, tmp_path / "run.npz")
+    file = swing.save(tmp_path / "run.npz")
     half = tmp_path / "half.npz"
     half.write_bytes(file.read_bytes()[:2000])
     (tmp_path / "x.mp4").write_text("a letter")

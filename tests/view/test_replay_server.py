@@ -204,7 +204,7 @@ def test_a_bridge_that_cannot_start_is_told_and_does_not_hang(swing, monkeypatch
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT")
 def test_nothing_reaches_the_terminal_of_the_command_and_ctrl_c_ends_it(swing, tmp_path) -> None:
     """With junk and raw bytes: its stderr stays empty, its exit code is 0, and its port is free again."""
-    file = rd.save_run(swing, tmp_path / "run.npz")
+    file = swing.save(tmp_path / "run.npz")
     heads = (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"\x00\xff\r\n\r\n", b"POST /static/ HTTP/9\r\n\r\n", b"GET")
     with started("replay", file) as command:
         assert command.stdout is not None

@@ -46,7 +46,7 @@ def test_nothing_holds_a_joint_in_balance() -> None:
 
 
 def test_rests_are_those_of_the_run_file(fall, tmp_path) -> None:
-    assert rests(rd.load_run(rd.save_run(fall, tmp_path / "fall"))) == rests(fall)
+    assert rests(rd.read(fall.save(tmp_path / "fall"))) == rests(fall)
 
 
 def test_plots_shade_rests(fall) -> None:

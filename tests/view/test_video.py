@@ -87,7 +87,7 @@ def test_each_frame_of_a_gif_is_the_page_at_its_time(
     motion: rd.Trajectory, seen: list[np.ndarray], tmp_path: Path
 ) -> None:
     """By the command, over an older one."""
-    rd.save_run(motion, tmp_path / "run.npz")
+    motion.save(tmp_path / "run.npz")
     (tmp_path / "run.gif").write_bytes(b"GIF89a")
     options = ("--video", tmp_path / "run.gif", "--fps", FPS, "--size", "320x240", "--force")
     assert f"written: {tmp_path / 'run.gif'}" in said("replay", tmp_path / "run.npz", *map(str, options))

@@ -44,7 +44,7 @@ def run_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A run; temporary files have a folder of their own, of a short name: browsers put a socket there."""
     monkeypatch.setenv("PATH", f"{Path(chromium()).parent}:/bin:/usr/bin")
     arm = rd.load("planar_2r")
-    file = rd.save_run(rd.simulate(arm, [0.4, -0.7], duration_s=1.0, estimate_error=False), tmp_path / "run.npz")
+    file = rd.simulate(arm, [0.4, -0.7], duration_s=1.0, estimate_error=False).save(tmp_path / "run.npz")
     with TemporaryDirectory(prefix="t") as folder:
         monkeypatch.setenv("TMPDIR", folder)
         yield file

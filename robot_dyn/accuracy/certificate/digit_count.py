@@ -1,4 +1,4 @@
-"""Count of digits: errors of implementations against finer numbers at many states, and against balls at the worst."""
+"""Count of digits: errors of implementations against finer arithmetic at many states, against balls at the worst."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
 from types import SimpleNamespace
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -25,9 +25,10 @@ from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, FORWARD_DYNAMICS, M, N
 from robot_dyn.queries.quantity import Quantity
 from robot_dyn.report.timing import Repeated
 
-FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
-_SIDE_BY_SIDE = 8  # states that machine code answers side by side, in the search and in the judgement
+FEWER = 250  # random states for each state judged by balls, if no other arithmetic is fine enough; at least 8 states
+_SIDE_BY_SIDE = 8  # states that machine code evaluates together, in the search and in the judgement
 LONGDOUBLE = "Lagrangian, longdouble"
+Engine = Robot | Lagrangian | CompiledDynamics | SimpleNamespace  # with a method for each quantity it answers
 
 
 @final
@@ -36,26 +37,26 @@ class Implementation:
     """One implementation of the equations.
 
     Attributes:
-        name: Of program or formulation, and numbers.
-        robot: Whose equations it has.
-        engine: Answers each quantity by the method of its name.
-        quantities: That it answers.
+        name: Name of the program or formulation, and of its arithmetic.
+        robot: Robot whose equations it evaluates.
+        engine: Object with a method for each quantity, of the same name.
+        quantities: The quantities that it answers.
     """
 
     name: str
     robot: Robot
-    engine: Any
+    engine: Engine
     quantities: tuple[Quantity, ...]
 
     @cached_property
     def fine(self) -> Lagrangian | None:
-        """The same equations in numbers that are finer by far; None if only balls are finer."""
+        """The same equations in longdouble, if it is much finer; None if only balls are finer."""
         longdouble = np.finfo(np.longdouble).eps < np.finfo(np.float64).eps / 100
         return Lagrangian(self.robot, np.longdouble) if longdouble and self.name != LONGDOUBLE else None
 
 
-def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
-    """Answers at states (S, n), some at a time, eight of machine code side by side; NaN where there is none."""
+def evaluate(engine: Engine, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
+    """Return answers at states (S, n), 512 states at a time; nan where there is no answer."""
     rows = [states[name] for name in quantity.arguments]
     parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
     answer = getattr(engine.nan_rows, quantity.name)
@@ -63,7 +64,7 @@ def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> 
 
 
 def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
-    """Return the implementations for a robot, and what is left out and why."""
+    """Return the implementations for a robot, and notes on those left out, with reasons."""
     left_out, quantities = list[str](), tuple(QUANTITIES.values())
     if robot.joint_without_inertia is not None:
         left_out.append(f"forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
@@ -73,7 +74,7 @@ def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
         engine = Lagrangian(robot, getattr(np, name))
         options.append(Implementation(f"Lagrangian, {name}", robot, engine, quantities))
     if not robot.couplings.trivial:
-        left_out.append("articulated bodies: they take no coupled joints")
+        left_out.append("articulated bodies: coupled joints are not supported")
     elif FORWARD_DYNAMICS in quantities:
         options.append(Implementation("articulated body", robot, _articulated_body(robot), (FORWARD_DYNAMICS,)))
     try:
@@ -88,12 +89,13 @@ def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
 
 
 def _articulated_body(robot: Robot) -> SimpleNamespace:
-    """Forward dynamics by articulated bodies, in the place of a `Dynamics`."""
-    own = Lagrangian(robot)
-    equation = partial(articulated_body, own.linkage)
+    """Return an object that computes `forward_dynamics` by articulated bodies, with the signature of `Dynamics`."""
+    lagrangian = Lagrangian(robot)
+    equation = partial(articulated_body, lagrangian.linkage)
 
     def forward_dynamics(q: Array, v: Array, tau: Array, *, nan: bool = False) -> Array:
-        return answered(equation, {"q": q, "v": v, "tau": tau}, (own.n,), own.joint_names, nan, FLOAT64)
+        arguments, n, names = {"q": q, "v": v, "tau": tau}, lagrangian.n, lagrangian.joint_names
+        return answered(equation, arguments, (n,), names, nan, FLOAT64)
 
     with_nan = SimpleNamespace(forward_dynamics=partial(forward_dynamics, nan=True))
     return SimpleNamespace(forward_dynamics=forward_dynamics, nan_rows=with_nan)
@@ -101,18 +103,18 @@ def _articulated_body(robot: Robot) -> SimpleNamespace:
 
 @final
 @dataclass(frozen=True)
-class Held(Repeated):
-    """The digits of one quantity by one implementation, from 0 to 20, and times of one query from Python.
+class CountedDigits(Repeated):
+    """Correct digits of one quantity by one implementation, from 0 to 20, and times of one query from Python.
 
     Attributes:
-        quantity: Its name.
-        implementation: Program or formulation, and numbers.
-        given: Digits at the given state; None if none was given.
+        quantity: Name of the quantity.
+        implementation: Name of the implementation, with its arithmetic.
+        given: Digits at the additional state of the user; None without one.
         typical: Median over the random states.
         random: Digits at the worst random state.
         searched: Digits at the worst state found.
         samples: Number of random states; 1 for balls, whose digits are proven.
-        state: The worst state, q, v, a, tau by name.
+        state: The worst state, with q, v, a, tau by name.
     """
 
     quantity: str
@@ -127,13 +129,18 @@ class Held(Repeated):
 
 @final
 class DigitCount:
-    """Counts the digits of the implementations of one robot.
+    """A count of the digits of the implementations of one robot.
 
     Args:
         robot: The robot.
-        states: Random ones.
-        given: A state to look at, or None.
-        rng: Of the search.
+        states: The random states.
+        given: An additional state, or None.
+        rng: Random generator of the search.
+
+    Attributes:
+        decimals: By quantity, fewest digits left after rounding the decimals of the file to float64.
+        right_angles: By quantity, fewest digits left after completing the rounded right angles of the file.
+        bits: Highest precision of the balls so far.
     """
 
     def __init__(self, robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator):
@@ -141,19 +148,19 @@ class DigitCount:
         self.decimals: dict[str, float] = {}
         self.right_angles: dict[str, float] = {}
         self.bits = 0
-        self._exact, self._rounded, self._own = cache(Exact), Exact(robot, rounded=True), Lagrangian(robot)
+        self._exact, self._rounded, self._lagrangian = cache(Exact), Exact(robot, rounded=True), Lagrangian(robot)
         self._fine = cache(lambda engine, quantity: evaluate(engine, quantity, states))
-        self._typical = cache(partial(_typical, self._own, states))
+        self._typical = cache(partial(_typical, self._lagrangian, states))
 
     def count(
         self, implementation: Implementation, quantity: Quantity, check: Callable[[], object] = lambda: None
-    ) -> Held:
-        """Count the digits of one implementation; its time is not measured.
+    ) -> CountedDigits:
+        """Count the digits of one implementation without timing it.
 
         Args:
             implementation: The implementation.
-            quantity: Of which they are counted.
-            check: Called before each batch of states; what it raises ends the count.
+            quantity: The quantity.
+            check: Called before each batch of states; an exception that it raises ends the count.
 
         Raises:
             QueryError: If the implementation has no finite answer.
@@ -167,35 +174,41 @@ class DigitCount:
         if implementation.fine is None:
             states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
             sizes = {"parents": 4, "children": 4, "generations": 3}
-        known = errors(states)
-        if np.isnan(known).all():
+        sampled = errors(states)
+        if np.isnan(sampled).all():
             raise QueryError(f"{quantity.name} by {implementation.name}: no random state has a finite answer")
-        at = row(states, int(np.nanargmax(known)))
-        worst, _ = worst_state(states, self._rng, errors, known, quantity.arguments, **sizes)
+        worst_random = row(states, int(np.nanargmax(sampled)))
+        worst, _ = worst_state(states, self._rng, errors, sampled, quantity.arguments, **sizes)
         check()
-        judged = [(self.judged(implementation, quantity, state), state) for state in (at, row(worst, 0))]
-        searched, state = max(judged, key=lambda each: each[0])
+        judged = [(self.judged(implementation, quantity, state), state) for state in (worst_random, row(worst, 0))]
+        largest, state = max(judged, key=lambda pair: pair[0])
         given = None if self.given is None else digits_of(self.judged(implementation, quantity, self.given))
-        typical = digits_of(float(np.nanmedian(known)))
-        self._of_file(implementation, quantity, state)
-        random, searched = digits_of(judged[0][0]), digits_of(searched)
-        at = {name: state[name].tolist() for name in quantity.arguments}
-        return Held(quantity.name, implementation.name, given, typical, random, searched, len(known), state=at)
+        self._count_file(implementation, quantity, state)
+        return CountedDigits(
+            quantity=quantity.name,
+            implementation=implementation.name,
+            given=given,
+            typical=digits_of(float(np.nanmedian(sampled))),
+            random=digits_of(judged[0][0]),
+            searched=digits_of(largest),
+            samples=len(sampled),
+            state={name: state[name].tolist() for name in quantity.arguments},
+        )
 
     def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
-        """True values at a state."""
+        """Return the true values at a state."""
         truth = self._exact(robot).at(quantity, state, self._typical(quantity))
         self.bits = max(self.bits, truth.bits)
         return truth
 
     def judged(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
-        """The error at a state, by balls."""
-        several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
-        answer = evaluate(implementation.engine, quantity, several)[0]
+        """Return the error at a state, against balls."""
+        copies = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
+        answer = evaluate(implementation.engine, quantity, copies)[0]
         return self.truth(implementation.robot, quantity, state).error(answer)
 
     def _errors(self, implementation: Implementation, quantity: Quantity, states: Batch) -> np.ndarray:
-        """Errors at states (S, n); NaN where there is no answer."""
+        """Return the errors at states (S, n); nan where there is no answer."""
         answers = evaluate(implementation.engine, quantity, states)
         if (engine := implementation.fine) is None:
             truths = (self.truth(implementation.robot, quantity, row(states, k)) for k in range(len(answers)))
@@ -205,18 +218,22 @@ class DigitCount:
         return relative.reshape(len(answers), -1).max(axis=1)
 
     def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
-        """Of errors at states, from fine answers; that of `truth`, but for rounding."""
-        inertia = evaluate(self._own, M, states)
+        """Return the scale of errors at states from fine answers; equal to that of `truth` up to rounding."""
+        inertia = evaluate(self._lagrangian, M, states)
         if not (quantity.definite or quantity.solves):
             return Scale(in_joint_units(quantity, fine.astype(float), inertia, self._typical(quantity)))
         if quantity.definite:
-            return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
+            return Scale(np.array([floored(row) for row in diagonal_scale(inertia)]))
         inertia[~np.all(np.isfinite(fine), axis=-1)] = np.eye(self.robot.n)  # where there is no answer
-        torques = (states["tau"], evaluate(self._own, CORIOLIS_TORQUE, states), evaluate(self._own, N, states))
+        torques = (
+            states["tau"],
+            evaluate(self._lagrangian, CORIOLIS_TORQUE, states),
+            evaluate(self._lagrangian, N, states),
+        )
         return Scale(solved_norm(inertia, torques), inertia)
 
-    def _of_file(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
-        """What the float64 of the file's decimals leaves at a state, and what right angles do."""
+    def _count_file(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
+        """Count the digits left by rounding the file's decimals to float64, and by exact right angles."""
         truth = self.truth(self.robot, quantity, state)
         both = [(self.decimals, self._rounded.at(quantity, state, self._typical(quantity)))]
         if implementation.robot is not self.robot:
@@ -225,11 +242,11 @@ class DigitCount:
             table[quantity.name] = min(digits_of(truth.error(other.values)), table.get(quantity.name, np.inf))
 
 
-def _typical(own: Lagrangian, states: Batch, quantity: Quantity) -> float:
-    """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
+def _typical(lagrangian: Lagrangian, states: Batch, quantity: Quantity) -> float:
+    """Return the largest root mean square of an entry at random states, in units of the joints; 1 if it is zero."""
     if quantity.definite or quantity.solves:
         return 0.0
-    ratios = evaluate(own, quantity, states) / entry_units(quantity, evaluate(own, M, states))
-    largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
+    ratios = evaluate(lagrangian, quantity, states) / entry_units(quantity, evaluate(lagrangian, M, states))
+    largest = float(np.nanmax(np.abs(ratios))) or 1.0  # divisor: squares may overflow
     size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
     return size if size > NOTHING else 1.0

@@ -1,9 +1,9 @@
-"""The state at which an error is largest: random ones first, then a search around the worst of these.
+"""Search for the state of largest error: random states first, then an evolution strategy that starts at the worst.
 
     (μ + λ) evolution strategy: children of the worst states, each moved in some coordinates by steps of many sizes
 
-Rounding makes the error jump from state to state, so that there is no slope to follow. States are numbers of float32,
-so that no arithmetic rounds them; a search stays within the range of the random ones. [Beyer and Schwefel, Evolution
+Rounding errors jump from state to state, so there is no gradient to follow. States are float32 numbers, so that no
+arithmetic rounds them. The search stays within the range of the random states. [Beyer and Schwefel, Evolution
 strategies, Natural Computing 1, 2002]
 """
 
@@ -23,13 +23,13 @@ _STEPS = (1e-7, 0.3)  # of the range of a coordinate
 
 
 def random_states(robot: Robot, count: int, rng: np.random.Generator) -> Batch:
-    """States as of `compare`, in numbers of float32."""
+    """Return random states sampled as in `compare`, rounded to float32."""
     states = [random_state(robot, rng) for _ in range(count)]
-    return {name: _in_float32(np.array([each[name] for each in states])) for name in states[0]}
+    return {name: _in_float32(np.array([state[name] for state in states])) for name in states[0]}
 
 
 def row(states: Batch, k: int) -> dict[str, np.ndarray]:
-    """One of the states."""
+    """Return state k of a batch."""
     return {name: x[k] for name, x in states.items()}
 
 
@@ -37,47 +37,47 @@ def worst_state(
     among: Batch,
     rng: np.random.Generator,
     errors: Errors,
-    known: np.ndarray,
+    sampled: np.ndarray,
     arguments: tuple[str, ...],
     parents: int = 8,
     children: int = 12,
     generations: int = 8,
 ) -> tuple[Batch, float]:
-    """The worst state that was found, (1, n) each, and its error.
+    """Return the worst state of the search, each part of shape (1, n), and its error.
 
     Args:
         among: The random states.
-        rng: Of the steps.
-        errors: What is made large.
-        known: Errors of the random states.
-        arguments: Names of those coordinates that matter.
+        rng: Generator of the steps.
+        errors: Function to maximise.
+        sampled: Errors of the random states.
+        arguments: Names of the coordinates on which the error depends.
         parents: Number of states that survive a generation.
-        children: Number of children of each.
-        generations: How many there are; five times as many while nothing worse than the random states is found.
+        children: Number of children of each parent.
+        generations: Number of generations; up to five times as many while no state exceeds the random ones.
     """
-    least, most = ({name: end(x, axis=0) for name, x in among.items()} for end in (np.min, np.max))
+    lowest, highest = ({name: end(x, axis=0) for name, x in among.items()} for end in (np.min, np.max))
 
-    def born(best: Batch) -> Batch:
-        """The children of a generation."""
+    def offspring(best: Batch) -> Batch:
+        """Return the children of a generation."""
         count = children * len(best["q"])
         steps = np.exp(rng.uniform(*np.log(_STEPS), size=(count, 1)))
         young = {name: np.repeat(x, children, axis=0) for name, x in best.items()}
         for name in [name for name in young if name in arguments]:
             x = young[name]
-            moves, wide = rng.random(x.shape) < 0.5, most[name] - least[name]
-            moved = x + moves * steps * wide * rng.normal(size=x.shape)
-            young[name] = _in_float32(np.clip(moved, least[name], most[name]))
+            moves, width = rng.random(x.shape) < 0.5, highest[name] - lowest[name]
+            moved = x + moves * steps * width * rng.normal(size=x.shape)
+            young[name] = _in_float32(np.clip(moved, lowest[name], highest[name]))
         return young
 
-    known = np.where(np.isfinite(known), known, -np.inf)
-    order = np.argsort(known)[::-1][:parents]
-    best, size = {name: x[order] for name, x in among.items()}, known[order]
+    sampled = np.where(np.isfinite(sampled), sampled, -np.inf)
+    order = np.argsort(sampled)[::-1][:parents]
+    best, size = {name: x[order] for name, x in among.items()}, sampled[order]
     for generation in range(5 * generations):
-        if generation >= generations and size[0] > known[order[0]]:
+        if generation >= generations and size[0] > sampled[order[0]]:
             break
-        young = born(best)
-        found = errors(young)
-        size = np.concatenate([size, np.where(np.isfinite(found), found, -np.inf)])
+        young = offspring(best)
+        new_size = errors(young)
+        size = np.concatenate([size, np.where(np.isfinite(new_size), new_size, -np.inf)])
         survivors = np.argsort(-size, kind="stable")[:parents]
         best = {name: np.concatenate([x, young[name]])[survivors] for name, x in best.items()}
         size = size[survivors]

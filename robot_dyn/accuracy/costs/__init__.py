@@ -1,8 +1,8 @@
-"""Costs: instructions and times of effects, control and algorithms on one arm.
+"""Instructions and times of effects, control and algorithms on one arm.
 
 cost           the study and its result
 step_cost      a step with each part on and off
-query_cost     algorithms for one query
+query_cost     alternative algorithms for one query
 ab_comparison  two versions, timed in turns
 diagram        the figure
 """

@@ -1,9 +1,9 @@
-"""What parts and algorithms cost, drawn: instructions of a step by part, and ratios of alternatives."""
+"""Diagram of costs: instructions of a step by part, and ratios of alternatives."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from robot_dyn.queries.units import format_duration
 from robot_dyn.report.figure import Colours, ResultError, ink, programs, sheet, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WIDTH, _HEIGHT, _ROW = 13.0, 2.3, 0.42  # [inch]
@@ -23,15 +24,15 @@ _TICKS = (0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
 def draw(result: Cost, theme: str = "light") -> Figure:
-    """The figure.
+    """Draw the figure.
 
     Raises:
         ResultError: If nothing was counted.
     """
     if not result.alternatives:
-        raise ResultError("nothing was counted, so there is nothing to draw; look at left_out")
+        raise ResultError("nothing was counted, so there is nothing to draw; see left_out")
     parts = _parts(result)
-    others = [each for each in result.alternatives if each.group != "parts"]
+    others = [pair for pair in result.alternatives if pair.group != "parts"]
     height = _HEIGHT + _ROW * max(len(parts), len(others))
     figure, colours = sheet(_WIDTH, height, result.sentence, _caption(result), theme)
     grid = figure.add_gridspec(1, 2)
@@ -43,16 +44,16 @@ def draw(result: Cost, theme: str = "light") -> Figure:
 
 
 def _caption(result: Cost) -> str:
-    versions = [of for each in result.alternatives for of in (each.first, each.second) if of.times]
-    hollow = "" if all(each.repeatable for each in versions) else " Hollow: a time that did not repeat to 5 %."
+    versions = [version for pair in result.alternatives for version in (pair.first, pair.second) if version.times]
+    hollow = "" if all(version.repeatable for version in versions) else " Hollow: timing varied by over 5 %."
     return (
-        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: the least over turns."
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times: least processor time over turns."
         f"{hollow} {programs(result.environment, 'llvmlite', 'casadi')}."
     )
 
 
 def _parts(result: Cost) -> list[tuple[str, int, str]]:
-    """What a step is made of: names, instructions, and times as texts."""
+    """Return the parts of a step: names, instructions, and times as text."""
     rows = []
     for pair in result.alternatives:
         if pair.group == "parts" and pair.what == EVERYTHING:
@@ -62,26 +63,26 @@ def _parts(result: Cost) -> list[tuple[str, int, str]]:
         elif pair.group == "parts":
             time = ", within noise" if pair.within_noise else _time(pair.time_between_s)
             rows.append((pair.what, pair.added, time))
-    return rows + ([("of several", result.shared, "")] if result.shared else [])
+    return rows + ([("shared by several", result.shared, "")] if result.shared else [])
 
 
 def _time(spent: float | None) -> str:
     return "" if spent is None else f", {'−' * (spent < 0)}{format_duration(abs(spent))}"
 
 
-def _draw_parts(axes: Any, parts: list[tuple[str, int, str]], colours: Colours) -> None:
-    styled(axes, colours, "instructions", "A step of RK4, by part: with it less without it")
+def _draw_parts(axes: Axes, parts: list[tuple[str, int, str]], colours: Colours) -> None:
+    styled(axes, colours, "instructions", "A step of RK4, by part: with it minus without it")
     names, counts, times = zip(*parts, strict=True)
     whole = sum(counts) or 1
     axes.barh(range(len(parts)), counts, 2 * _BAR, color=colours["lines"][0])
     for place, (n, time) in enumerate(zip(counts, times, strict=True)):  # right of 0: the names are on the left
-        said = f" {n} ({100 * n / whole:.1f} %){time}".replace("-", "−")
-        axes.text(max(n, 0), place, said, va="center", fontsize=8, **ink(colours))
-    _named(axes, names, colours)
+        label = f" {n} ({100 * n / whole:.1f} %){time}".replace("-", "−")
+        axes.text(max(n, 0), place, label, va="center", fontsize=8, **ink(colours))
+    _label_rows(axes, names, colours)
     axes.set_xlim(min(0, *counts), 1.7 * max(counts) or 1)
 
 
-def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> None:
+def _draw_ratios(axes: Axes, others: list[ABComparison], colours: Colours) -> None:
     from matplotlib.ticker import NullFormatter
 
     styled(axes, colours, "ratio, first / second", "Alternatives: instructions in blue, time in orange")
@@ -91,20 +92,20 @@ def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> Non
     axes.set_xticks(_TICKS, [f"{x:g}" for x in _TICKS])
     axes.xaxis.set_minor_formatter(NullFormatter())
     for k, colour in enumerate(colours["lines"][:2]):
-        hollow = [k and not (pair.first.repeatable and pair.second.repeatable) for pair in others]
-        faces, places = ["none" if x else colour for x in hollow], np.arange(len(others)) + (k - 0.5) * _BAR
+        is_hollow = [k and not (pair.first.repeatable and pair.second.repeatable) for pair in others]
+        faces, places = ["none" if x else colour for x in is_hollow], np.arange(len(others)) + (k - 0.5) * _BAR
         axes.barh(places, ratios[:, k] - 1, _BAR, left=1, edgecolor=colour, color=faces)
         for x, y in zip(ratios[:, k], places, strict=True):
             if np.isfinite(x):
                 axes.text(max(x, 1), y, f" {x:.2g}", va="center", fontsize=8, **ink(colours))
     axes.axvline(1, color=colours["ink"], linewidth=0.9)
-    _named(axes, [f"{pair.what}:\n{pair.first.name} / {pair.second.name}" for pair in others], colours)
-    least, most = (np.nanmin(ratios, initial=1.0), np.nanmax(ratios, initial=2.0))
-    axes.set_xlim(min(0.7, least / 1.2), 1.6 * most)
+    _label_rows(axes, [f"{pair.what}:\n{pair.first.name} / {pair.second.name}" for pair in others], colours)
+    smallest, largest = (np.nanmin(ratios, initial=1.0), np.nanmax(ratios, initial=2.0))
+    axes.set_xlim(min(0.7, smallest / 1.2), 1.6 * largest)
 
 
-def _named(axes: Any, names: Sequence[str], colours: Colours) -> None:
-    """Rows from above, by name."""
+def _label_rows(axes: Axes, names: Sequence[str], colours: Colours) -> None:
+    """Label the rows by name, from top to bottom."""
     axes.set_yticks(range(len(names)), [drawable(name) for name in names])
     axes.tick_params(axis="y", length=0)
     for label in axes.get_yticklabels():

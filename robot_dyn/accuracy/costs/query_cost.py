@@ -1,4 +1,4 @@
-"""What algorithms cost on an arm, by the kernels of `compiled`: for many states side by side on one thread.
+"""Cost of alternative algorithms on one arm, by the kernels of `compiled`: many states together on one thread.
 
 full C(q, v) against C(q, v) v;   M = L D Lᵀ against articulated bodies;   C v in forward dynamics, on and off;
 ∂a/∂(q, v, τ) exact against central differences, 6 n evaluations;   float64 against float32
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import process_time
-from typing import Any, final
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -29,40 +29,43 @@ from robot_dyn.report.timing import seconds
 
 STATES = 1024  # side by side
 PER_STATE = f"state, {STATES} side by side"
-_LEAST_S = 2e-3  # of a loop that is timed
-_MOST_TIMED = 30_000  # instructions, some seconds of compiling; longer programs are counted alone
+_MIN_LOOP_S = 2e-3  # duration of a timed loop
+_MAX_TIMED = 30_000  # instructions, some seconds of compiling; longer programs are counted but not timed
 _FORWARD, _DERIVATIVES = "forward_dynamics", "forward_dynamics_derivatives"
 
 
 @final
 @dataclass(frozen=True)
 class QueryCost:
-    """The queries of a robot.
+    """Comparisons of algorithms for the queries of a robot.
 
     Attributes:
-        given: The robot, as its file has it.
+        robot: The robot, with the right angles stated in its file.
     """
 
-    given: Robot
+    robot: Robot
 
     @cached_property
     def _trace(self) -> Trace:
-        return Trace(completed(self.given)[0])
+        return Trace(completed(self.robot)[0])
 
     @cached_property
     def _forward(self) -> dict[str, ca.Function]:
-        """Forward dynamics by each formulation."""
+        """Forward dynamics by formulation."""
         return self._trace.formulations(_FORWARD)
 
     @cached_property
     def _best(self) -> tuple[ca.Function, Program]:
-        """That of the fewest instructions, and its program."""
-        programs = [(each, program_of(each)) for each in self._forward.values()]
-        return min(programs, key=lambda each: len(each[1]))
+        """Forward dynamics of the fewest instructions, and its program."""
+        programs = [(function, program_of(function)) for function in self._forward.values()]
+        return min(programs, key=lambda pair: len(pair[1]))
 
     def pairs(self) -> Iterator[tuple[str, Callable[[], ABComparison]]]:
-        """What is compared, by name, each made when it is called; QueryError if it cannot be on this arm."""
-        for group, what, ways in (
+        """Return the names of the comparisons, with functions that make them.
+
+        Such a function raises QueryError if the comparison is not possible on this arm.
+        """
+        for group, what, versions in (
             ("algorithms", "Coriolis matrix", self._coriolis_matrix),
             ("algorithms", "forward dynamics", self._forward_dynamics),
             ("algorithms", "C(q, v) v in forward dynamics", self._coriolis_torque),
@@ -70,69 +73,68 @@ class QueryCost:
             ("machine code", "right angles of the file", self._right_angles),
             ("machine code", "numbers of forward dynamics", self._floats),
         ):
-            yield what, lambda group=group, what=what, ways=ways: ABComparison(group, what, PER_STATE, *ways())
+            yield what, lambda group=group, what=what, make=versions: ABComparison(group, what, PER_STATE, *make())
 
     def _coriolis_matrix(self) -> tuple[Version, Version]:
-        full, alone = (self._quantity(name) for name in ("C", "coriolis_torque"))
-        return self._way("full C", full), self._way("C v alone", alone)
+        full, product = (self._quantity(name) for name in ("C", "coriolis_torque"))
+        return self._version("full C", full), self._version("C v alone", product)
 
     def _forward_dynamics(self) -> tuple[Version, Version]:
-        for name, why in _WITHOUT.items():
+        for name, reason in _REASONS.items():
             if name not in self._forward:
-                raise QueryError(why)
-        recursion, articulated = (program_of(self._forward[name]) for name in _WITHOUT)
-        return self._way("M, Cholesky", recursion), self._way("articulated body", articulated)
+                raise QueryError(reason)
+        recursion, articulated = (program_of(self._forward[name]) for name in _REASONS)
+        return self._version("M, Cholesky", recursion), self._version("articulated body", articulated)
 
     @property
     def at_rest(self) -> ca.Function:
-        """Forward dynamics of (q, v, τ) without C(q, v) v: that of v = 0."""
+        """Forward dynamics of (q, v, τ) without C(q, v) v, evaluated at v = 0."""
         q, v, tau = (self._trace.symbols[name][0] for name in ("q", "v", "tau"))
-        function, zero = self._best[0], ca.DM.zeros(self.given.n)
+        function, zero = self._best[0], ca.DM.zeros(self.robot.n)
         return ca.Function("f", [q, v, tau], [ca.cse(ca.densify(function(q, zero, tau)))])
 
     def _coriolis_torque(self) -> tuple[Version, Version]:
-        return self._way("on", self._best[1]), self._way("off", program_of(self.at_rest))
+        return self._version("on", self._best[1]), self._version("off", program_of(self.at_rest))
 
     def _derivatives(self) -> tuple[Version, Version]:
-        n, evaluations = self.given.n, 6 * self.given.n
-        once = self._way(f"differences, {evaluations} evaluations", self._best[1])
-        run: Any = once.run
-        count = evaluations * once.instructions
-        differences = replace(once, instructions=count, run=lambda: evaluations * run())
-        return differences, self._way("exact", self._quantity(_DERIVATIVES), (3, n, n))
+        n, evaluations = self.robot.n, 6 * self.robot.n
+        once = self._version(f"differences, {evaluations} evaluations", self._best[1])
+        run, count = once.run, evaluations * once.instructions
+        differences = replace(once, instructions=count, run=lambda: evaluations * run() if run else 0.0)
+        return differences, self._version("exact", self._quantity(_DERIVATIVES), (3, n, n))
 
     def _right_angles(self) -> tuple[Version, Version]:
-        if not completed(self.given)[1]:
-            raise QueryError("the file states none with too few digits, so nothing is written out")
-        stated = program_of(Trace(self.given).quantity(_FORWARD).function)
-        return self._way("as stated", stated), self._way("written out", self._best[1])
+        if not completed(self.robot)[1]:
+            raise QueryError("the file states none with too few digits")
+        stated = program_of(Trace(self.robot).quantity(_FORWARD).function)
+        return self._version("as stated", stated), self._version("exact", self._best[1])
 
     def _floats(self) -> tuple[Version, Version]:
-        return self._way("float64", self._best[1]), self._way("float32", self._best[1], dtype="float32")
+        return self._version("float64", self._best[1]), self._version("float32", self._best[1], dtype="float32")
 
     def _quantity(self, name: str) -> Program:
         return program_of(self._trace.quantity(name).function)
 
-    def _way(self, name: str, program: Program, shape: tuple[int, ...] = (), dtype: str = "float64") -> Version:
-        """The time per state of a program."""
+    def _version(self, name: str, program: Program, shape: tuple[int, ...] = (), dtype: str = "float64") -> Version:
+        """Return a version that times a program per state."""
         outputs = shape or (len(program.outputs),)
-        kernel = Kernel(program, outputs, dtype, store=default_store(), about=f"{self.given.name}: {name}, {dtype}")
+        kernel = Kernel(program, outputs, dtype, store=default_store(), about=f"{self.robot.name}: {name}, {dtype}")
         rng = np.random.default_rng(8)
         inputs = [rng.normal(size=(STATES, length)).astype(dtype) for length in program.inputs]
         y = np.empty((STATES, len(program.outputs)), dtype)
 
         def run() -> float:
-            if len(program) > _MOST_TIMED:
-                raise RobotDynError(f"{len(program)} instructions, more than {_MOST_TIMED}, take long to compile")
+            if len(program) > _MAX_TIMED:
+                raise RobotDynError(f"{len(program)} instructions, more than {_MAX_TIMED}, take long to compile")
             if kernel.many(inputs, y) is not Status.FINE:
-                raise RobotDynError("its results at random states are doubtful")
-            return seconds(lambda: kernel.many(inputs, y), _LEAST_S, process_time) / STATES
+                raise RobotDynError("it has no reliable result at some random state")
+            return seconds(lambda: kernel.many(inputs, y), _MIN_LOOP_S, process_time) / STATES
 
         return Version(name, len(program), run)
 
 
-_WITHOUT = {  # formulations of forward dynamics, with why an arm has none
-    "recursion": "more than 8 joints stand one after the other: to solve with M outnumbers articulated bodies, and is"
-    " not traced",
-    "articulated body": "joints are coupled: articulated bodies take those that are free, so M is solved with",
+_REASONS = {  # formulations of forward dynamics, each with the reason why an arm lacks it
+    "recursion": "with more than 8 joints in series, solving with M takes more instructions than articulated bodies,"
+    " and is not traced",
+    "articulated body": "joints are coupled: articulated bodies support only free joints, so M is factorised",
 }

@@ -1,8 +1,8 @@
-"""What a step of RK4 costs: with each part of a setup on and off, alone and side by side, numbers inputs or constants.
+"""Cost of a step of RK4: each part of a setup on and off, one run or many together, numbers as inputs or constants.
 
-instructions = 4 · those of y' = f(t, y), and those of a tick where the control is sampled
+instructions = 4 × instructions of y' = f(t, y), plus those of a tick if the control is sampled
 
-A step is so short that the motion stays at its start, whatever acts, and a sampled controller has a tick at each.
+Steps are so short that the motion stays at its start. A sampled controller has a tick at every step.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from time import process_time
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,7 @@ from robot_dyn.simulation.run.state import RunState
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
-RUNS = 4096  # side by side
+RUNS = 4096  # many runs together, on one thread
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
 EVERYTHING, NUMBERS, SIDE_BY_SIDE = "everything", "numbers of the setup", "runs"
 _EVALUATIONS = 4  # of RK4, in a step
@@ -44,51 +43,49 @@ _STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
 
 
 def parts(setup: Setup) -> Iterator[tuple[str, Setup]]:
-    """Each part that acts, by name, with the setup without it: gravity, other edits, effects, loop and control.
+    """Return every part by name, with the setup without it: gravity, other edits, effects, loop and control.
 
-    Models of the controller are without what the plant is without: what both compute alike is computed once.
+    An edit that is removed from the plant is also removed from the models of the controller, because machine code
+    computes common terms once.
     """
     plant, controller = setup.plant, setup.controller
-    models: dict[str, Any] = {} if controller is None else controller.models
-    for name in _edits(plant.dynamics):
+    models = {} if controller is None else controller.models
+    for name, dynamics in _edits(plant.dynamics).items():
         off = {key: without for key, model in models.items() if (without := _edits(model).get(name)) is not None}
-        dynamics = _edits(plant.dynamics)[name]
         yield name, replace(setup, plant=Plant(dynamics, plant.effects), controller=with_values(controller, off))
     names = names_of(plant.effects)
     for name in dict.fromkeys(names):
-        left = [each for each, own in zip(plant.effects, names, strict=True) if own != name]
-        yield name, replace(setup, plant=Plant(plant.dynamics, left))
+        others = [effect for effect, own_name in zip(plant.effects, names, strict=True) if own_name != name]
+        yield name, replace(setup, plant=Plant(plant.dynamics, others))
     if isinstance(controller, Loop):
         yield "loop", replace(setup, controller=controller.controller)
     if setup.controller is not None:
         yield "control", replace(setup, controller=None)
 
 
-def _edits(dynamics: Any) -> dict[str, Robot]:
-    """What acts by an edit of a robot, by name, with the robot without it."""
+def _edits(dynamics: object) -> dict[str, Robot]:
+    """Return the edits of a robot that act, by name, with the robot without each of them."""
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         return {}
     edits = robot.edits
-    made = {
+    without = {
         "gravity": replace(edits, gravity=(0.0, 0.0, 0.0)) if any(edits.gravity) else None,
         "payload": replace(edits, payloads=()) if edits.payloads else None,
         "armature": replace(edits, armature=()) if any(value for _, value in edits.armature) else None,
     }
-    return {name: Robot(robot.description, each) for name, each in made.items() if each is not None}
+    return {name: Robot(robot.description, others) for name, others in without.items() if others is not None}
 
 
 def bare(setup: Setup) -> Setup:
-    """The rigid bodies of a setup, with nothing that acts on them."""
-    left = dict(parts(setup))
-    while left:
-        setup = next(iter(left.values()))
-        left = dict(parts(setup))
+    """Return the setup of the rigid bodies alone, without any part."""
+    while setups := dict(parts(setup)):
+        setup = next(iter(setups.values()))
     return setup
 
 
 def pairs_of_parts(setup: Setup) -> Iterator[ABComparison]:
-    """A step with everything on and off, then with each part off.
+    """Compare a step with everything on and off, then with each part off.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
@@ -99,39 +96,39 @@ def pairs_of_parts(setup: Setup) -> Iterator[ABComparison]:
 
 
 def numbers(setup: Setup) -> ABComparison:
-    """Numbers as inputs of machine code, and as constants."""
+    """Compare numbers as inputs of machine code with numbers as constants."""
     constants = one_run("constants", setup, machine_code_of_constants)
     return ABComparison("machine code", NUMBERS, PER_STEP, one_run("inputs", setup), constants)
 
 
 def side_by_side(setup: Setup) -> ABComparison:
-    """One run, and many of them side by side on one thread."""
+    """Compare one run with many runs together on one thread."""
     many = many_runs(f"{RUNS} side by side", setup)
     return ABComparison("machine code", SIDE_BY_SIDE, PER_RUN, one_run("one", setup), many)
 
 
 def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _IN_LANES) -> Version:
-    """A step and run of many side by side."""
+    """Return the version of many runs together, per step and run."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = translate(_equation(short), short.method, lanes=LANES)
+    code = translate(_equation(short), short.method, lanes=LANES)
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
-        batch = Tiles(Batch(short, *starts), made)
+        batch = Tiles(Batch(short, *starts), code)
         began = process_time()
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)
 
-    return Version(name, instructions(made), run)
+    return Version(name, instructions(code), run)
 
 
 def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Version:
-    """A step of one run."""
+    """Return the version of one run, per step."""
     short = _short(setup, _STEPS)
-    made = translate(_equation(short), short.method)
+    code = translate(_equation(short), short.method)
 
     def run() -> float:
-        state = RunState(short, replace(made, equation=made.compiled_form), segment_table(short), None)
+        state = RunState(short, replace(code, equation=code.compiled_form), segment_table(short), None)
         steps = FixedSteps(state, Fraction(1))
         state.position.budget[0] = np.iinfo(np.int64).max
         began = process_time()
@@ -141,12 +138,12 @@ def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = mac
             raise RobotDynError(f"a run of {short.duration_s:g} s from the start diverges near {steps.time:g} s")
         return spent / short.steps
 
-    return Version(name, instructions(made), run)
+    return Version(name, instructions(code), run)
 
 
-def instructions(made: MachineCode) -> int:
-    """Of a step, what the method itself adds apart."""
-    programs = made.code.programs
+def instructions(code: MachineCode) -> int:
+    """Return the instructions of a step, without those of the method itself."""
+    programs = code.code.programs
     return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
 
 
@@ -155,8 +152,8 @@ def _equation(setup: Setup) -> StateEquation:
 
 
 def _short(setup: Setup, steps: int) -> Setup:
-    """So many short steps of RK4 from the start, with a tick at each where the control is sampled."""
-    controller: Any = setup.controller
+    """Return the setup with a number of short steps of RK4, and a tick at every step if the control is sampled."""
+    controller = setup.controller
     if controller is not None and controller.period_s:
         controller = controller.at_period(_STEP_S)
     duration = steps * _STEP_S

@@ -1,6 +1,6 @@
-"""Methods under test in a work-precision diagram: each with its ladder of settings, and then with its measured runs.
+"""Methods under test in a work-precision diagram: a method with its ladder of settings, and with its measured runs.
 
-Preparation is not timed: the time of a run is that of its loop, and of what it records. For sufficiently small steps,
+Preparation is not timed: the time of a run is the time of its loop, recording included. For sufficiently small steps,
 error ∝ h^p, so log error against log steps is a line of slope −p. [Hairer, Nørsett, Wanner 1993, II.10]
 """
 
@@ -14,13 +14,14 @@ from itertools import pairwise
 from math import ceil, gcd, isfinite, lcm
 from statistics import median
 from time import perf_counter
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.right_angles import completed, models_in_full
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import format_duration
@@ -62,7 +63,7 @@ class Point(Repeated):
         error: Largest |q − q_ref| over joints and records, in [rad] or [m]; inf if the run diverged.
         energy: Largest residual of the energy ledger at the records, as a fraction of the energy exchanged; nan if
             unknown.
-        believed: Whether the error is above that of the reference.
+        resolved: True if the error is above that of the reference.
     """
 
     setting: float
@@ -70,13 +71,13 @@ class Point(Repeated):
     evaluations: int | None
     error: float
     energy: float
-    believed: bool
+    resolved: bool
 
 
 @final
 @dataclass(frozen=True)
 class Price:
-    """Time to reach an error, in [s], and whether it is extrapolated."""
+    """Time to reach an error, in [s]; `extrapolated` is True if no run reached it."""
 
     value: float
     extrapolated: bool
@@ -92,9 +93,9 @@ class Method:
     Attributes:
         method: Name of the method.
         engine: "compiled" or "interpreted"; "" for another program.
-        events: Whether steps end at the thresholds of the effects.
+        events: True if steps end at the thresholds of the effects.
         order: Order stated by the source of the method; None if there is none.
-        by: What varies from run to run: "step" or "tolerance".
+        by: The setting that varies from run to run: "step" or "tolerance".
     """
 
     method: str
@@ -106,12 +107,12 @@ class Method:
     @reported
     def name(self) -> str:
         """Name of the method, with any marks that distinguish its engine and events."""
-        apart = [INTERPRETED] * (self.engine == INTERPRETED) + ["without events"] * (not self.events)
-        return f"{self.method} ({', '.join(apart)})" if apart else self.method
+        marks = [INTERPRETED] * (self.engine == INTERPRETED) + ["without events"] * (not self.events)
+        return f"{self.method} ({', '.join(marks)})" if marks else self.method
 
     @property
     def peer(self) -> bool:
-        """Whether the method is from another program."""
+        """True if the method is from another program."""
         return not self.engine
 
 
@@ -122,7 +123,7 @@ class ToleranceLadder(Method):
 
     Attributes:
         points: The runs, from coarse to fine.
-        ended: Why there is no finer run.
+        ended: Reason why there is no finer run.
         floor: Error of the reference, in [rad] or [m].
     """
 
@@ -145,25 +146,25 @@ class ToleranceLadder(Method):
         return median(slopes) if len(slopes) > 1 else None
 
     def price(self, error: float) -> Price | None:
-        """Time to reach an error; None if it cannot be estimated.
+        """Return the time to reach an error; None if it cannot be estimated.
 
         Between two runs the time is interpolated logarithmically; an error that a finer run exceeds does not count as
         reached. Beyond the finest run it is extrapolated with the stated or the measured order, whichever is lower.
         """
-        known = [p for p in self.points if isfinite(p.error)]
-        if error < self.floor or not known:
+        finite = [p for p in self.points if isfinite(p.error)]
+        if error < self.floor or not finite:
             return None
-        errors = np.maximum([p.error for p in known], self.floor)
+        errors = np.maximum([p.error for p in finite], self.floor)
         errors = np.maximum.accumulate(errors[::-1])[::-1]
-        times = np.array([p.time_s for p in known])
+        times = np.array([p.time_s for p in finite])
         times = np.minimum.accumulate(times[::-1])[::-1]  # a finer run that took less serves as well
         reached = np.flatnonzero(errors <= error)
         if len(reached):
             i = int(reached[0])
             if i == 0:
                 return Price(float(times[i]), False)
-            part = np.log(errors[i - 1] / error) / np.log(errors[i - 1] / errors[i])
-            return Price(float(times[i - 1] * (times[i] / times[i - 1]) ** part), False)
+            fraction = np.log(errors[i - 1] / error) / np.log(errors[i - 1] / errors[i])
+            return Price(float(times[i - 1] * (times[i] / times[i - 1]) ** fraction), False)
         orders = [p for p in (self.order, self.measured_order) if p is not None and p > 0]
         if errors[-1] > _RESOLVED or not orders:
             return None
@@ -178,7 +179,8 @@ class Run:
     Attributes:
         t: Times of the records, (k,), in [s]; for a fixed-step method, only those that are ends of steps.
         q: Positions at these times, (k, n); None if the run diverged.
-        energy: As in `Point`, as are the other attributes.
+        energy, steps, evaluations: See `Point`.
+        time_s: Time of the loop, in [s].
     """
 
     t: np.ndarray
@@ -205,24 +207,24 @@ class MethodUnderTest(Method):
     warm: Callable[[], object] = tuple
 
     def growth(self, before: float, after: float) -> float:
-        """Approximate factor by which the cost grows from one setting to the next."""
+        """Return the approximate factor by which the time grows from one setting to the next."""
         return (before / after) ** (1.0 if self.by == "step" else 1 / (self.order or _UNKNOWN))
 
 
 def whole(setup: Setup) -> Setup:
-    """The setup with the right angles of its files at full precision, as in machine code.
+    """Return the setup with the right angles of its files at full precision, as in machine code.
 
     Both engines then run the same equations.
     """
     controller = models_in_full(setup.controller, lambda model: completed(model)[0])
-    dynamics: Any = setup.plant.dynamics
+    dynamics = setup.plant.dynamics
     robot = completed(dynamics)[0] if isinstance(dynamics, Robot) else dynamics
     plant = setup.plant if robot is dynamics else Plant(robot, setup.plant.effects)
     return replace(setup, plant=plant, controller=controller)
 
 
 def recorded(setup: Setup, duration_s: float) -> Setup:
-    """The setup up to `duration_s`, with about RECORDS records and no error estimate."""
+    """Return the setup up to `duration_s`, with about RECORDS records and no error estimate."""
     return replace(
         setup, method=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
         duration_s=duration_s, record_every_s=_record_period(setup, duration_s),
@@ -230,8 +232,8 @@ def recorded(setup: Setup, duration_s: float) -> Setup:
 
 
 def _record_period(setup: Setup, duration_s: float) -> float:
-    """Period whose multiples are ends of steps of any length: whole ticks, or a divisor of switching intervals."""
-    controller: Any = setup.controller
+    """Return a period whose multiples are ends of steps: whole ticks, or a divisor of the switching intervals."""
+    controller = setup.controller
     tick = controller.period_s if controller is not None else 0.0
     if tick and RECORDS * tick <= duration_s:
         return tick * round(duration_s / tick / RECORDS)
@@ -246,46 +248,46 @@ def _record_period(setup: Setup, duration_s: float) -> float:
 
 
 def common(t: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Index in the ascending times `of` of each time in t; −1 for times not found."""
+    """Return the index of each time t in the ascending times `of`; −1 for a time that is not among them."""
     place = np.clip(np.searchsorted(of, t - _ON_TIME * of[-1] / len(of)), 0, len(of) - 1)
     return np.where(np.abs(of[place] - t) <= _ON_TIME * of[-1], place, -1)
 
 
 def switches(setup: Setup) -> bool:
-    """Whether effects have thresholds at which steps end."""
+    """Return True if effects have thresholds at which steps end."""
     return any(effect.thresholds(setup.plant.dynamics.n) for effect in setup.plant.effects)
 
 
-def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnderTest:
-    """A method of this library, or one with the same interface.
+def own(setup: Setup, method: Integrator | Adaptive, engine: str, events: bool = True) -> MethodUnderTest:
+    """Return the test of a method of this library, or of one with the same interface.
 
     Args:
         setup: The setup to run, as returned by `recorded`.
-        made: The method.
+        method: The method.
         engine: "compiled" or "interpreted".
-        events: Whether steps end at the thresholds of the effects.
+        events: True if steps end at the thresholds of the effects.
     """
-    setup = replace(setup, method=made, engine=engine)
+    setup = replace(setup, method=method, engine=engine)
 
     def run(setting: float, limit: Limit) -> Run:
         return timed(at_setting(setup, setting), limit, events)
 
-    order, by, settings = ORDERS.get(made.name), "tolerance", tolerances
-    if not made.controls_error:
-        order, by, settings = made.order, "step", partial(_steps, setup, made.order, events)
-    return MethodUnderTest(made.name, engine, events, order, by, settings, run, lambda: warmed(setup))
+    order, by, settings = ORDERS.get(method.name), "tolerance", tolerances
+    if isinstance(method, Integrator):
+        order, by, settings = method.order, "step", partial(_steps, setup, method.order, events)
+    return MethodUnderTest(method.name, engine, events, order, by, settings, run, lambda: warmed(setup))
 
 
 def at_setting(setup: Setup, setting: float) -> Setup:
-    """The setup with its method at a step, in [s], or a relative tolerance."""
+    """Return the setup with its method at a step, in [s], or at a relative tolerance."""
     if isinstance(setup.method, Adaptive):
         return replace(setup, method=replace(setup.method, rtol=setting, atol=ATOL * setting))
     return replace(setup, step_s=setting)
 
 
 def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
-    """Steps from the record period on, up to the number that a run may take."""
-    before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # of more steps none ends at an event
+    """Return steps from the record period downwards, while a run does not exceed the number of steps allowed."""
+    before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # beyond MOST_CUT events end no steps
     for step in step_ladder(setup.record_every_s, order):
         count = at_setting(setup, step).steps
         if count > most:
@@ -296,12 +298,12 @@ def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
 
 
 def tolerances() -> list[float]:
-    """Relative tolerances, each a tenth of the one before."""
+    """Return relative tolerances, each a tenth of the previous one."""
     return [10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1)]
 
 
 def step_ladder(period_s: float, order: int) -> Iterator[float]:
-    """Steps that divide the record period: each half the one before, or about 1/√2 of it for high orders."""
+    """Return steps that divide the record period: each half the previous one, or about 1/√2 of it for high orders."""
     k, before = 0, 0
     while True:
         parts = round(2 ** (k / 2)) if order >= _HIGH else 2**k
@@ -330,10 +332,14 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
     if record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
     finished = record.outcome.ending is Ending.FINISHED
-    met = np.ones(len(record.t), bool)
+    is_end = np.ones(len(record.t), bool)
     if not setup.method.controls_error and record.ends is not None:
-        met = common(record.t, np.append(0.0, record.ends)) >= 0
+        is_end = common(record.t, np.append(0.0, record.ends)) >= 0
     return Run(
-        record.t[met], record.y[met, : setup.plant.dynamics.n] if finished else None,
-        ledger(setup.equation, record).closure if finished else float("nan"), record.steps, record.evaluations, spent,
-    )  # fmt: skip
+        t=record.t[is_end],
+        q=record.y[is_end, : setup.plant.dynamics.n] if finished else None,
+        energy=ledger(setup.equation, record).closure if finished else float("nan"),
+        steps=record.steps,
+        evaluations=record.evaluations,
+        time_s=spent,
+    )

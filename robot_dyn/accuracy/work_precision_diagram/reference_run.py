@@ -1,13 +1,13 @@
-"""What errors are measured against: two runs by methods of different kind, tighter than all others.
+"""Reference solution: two runs by methods of different kind, with tighter settings than all other runs.
 
-Their distance is the error of the reference. Where they part, as in chaotic motion, the horizon is cut. Beyond it
-energy judges, and the way back:
+The distance of the two runs is the error of the reference. Where they part, as in chaotic motion, the horizon is cut.
+Past the horizon methods are judged by energy, and by the return error:
 
-    |q − q₀|   of a run to the end and, with its velocity turned round, back to the start
+    |q − q₀|   after a run to the end and, with reversed velocity, back to the start
 
-A motion that is not driven and loses no energy returns to its start. Rounding grows on the way as
-the errors of the method do: a method with smaller errors returns nearer to it, until only rounding is left. [Hairer,
-Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, V.1]
+A motion without drive or dissipation returns to its start. Rounding errors grow along the way as the errors of the
+method do: a method with smaller errors returns closer, until only rounding remains. [Hairer, Lubich, Wanner, Geometric
+Numerical Integration, 2nd ed., 2006, V.1]
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import isfinite
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import method
 from robot_dyn.report.time_budget import Budget, OvertimeError
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -44,20 +45,20 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 
-_PARTED = 1e-9  # of the positions: where references differ by more, nothing finer can be shown
-_COARSE = 1e-6  # the same where the second one could not be refined until only rounding is left
-_STAGNANT = 0.3  # decades that twice as many steps must win
-_ORDERLY = 1e-6  # distance at the first record, from which on that is judged
-_ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that need not be less: where shorter steps take seconds
-_ROUGH, _ROUGHLY = 1e-11, 1e-6  # a tolerance, and where its run parts from the first one: beyond, nothing is resolved
-_LATE = 3  # runs of one method that may take too long
-_LOST = 0.1  # [rad] or [m]: runs that far apart have nothing in common
-_LEAST = 1e-3  # of the duration: a horizon that is shorter shows nothing
+_PARTED = 1e-9  # of the positions: runs that differ by more have parted
+_COARSE = 1e-6  # same, if the second run could not be refined down to rounding
+_STAGNANT = 0.3  # decades: twice as many steps that gain less do not refine
+_ORDERLY = 1e-6  # distance at the first record below which refinement is judged
+_ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that is small enough: interpreted shorter steps take seconds
+_ROUGH, _ROUGHLY = 1e-11, 1e-6  # a looser tolerance, and the distance of its run from the first that ends the horizon
+_MAX_LATE = 3  # runs of one method that may take too long
+_LOST = 0.1  # [rad] or [m]: runs that differ by more have nothing in common
+_MIN_HORIZON = 1e-3  # of the duration
 _ULPS = 4.0  # of rounding in any position
 _FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-12, 1e-14))
 _SECOND = ("GaussLegendre6", "Rodas5PFixed")
-_SHARE, _LEAST_S = 0.08, 0.5  # of the budget, for one run; and at least, in [s]
-_PART = 0.02  # of the budget, for one run
+_REFERENCE_FRACTION, _MIN_LIMIT_S = 0.08, 0.5  # of the budget, for one reference run, with a lower limit in [s]
+_RUN_FRACTION = 0.02  # of the budget, for one run past the horizon
 
 
 class HorizonError(RobotDynError):
@@ -67,17 +68,17 @@ class HorizonError(RobotDynError):
 @final
 @dataclass(frozen=True, eq=False)
 class Reference(Value):
-    """What errors are measured against.
+    """The reference solution of a motion.
 
     Attributes:
         t: Times of the records, (k,), in [s].
-        q: Positions there, (k, n).
-        error: Distance of the two runs, in [rad] or [m]: no error below it is believed.
-        methods: What made them, the one that q is of first.
-        horizon_s: Time up to which it reaches, in [s].
-        parted_s: Time at which they, or runs at tolerances of 3e-14 and 1e-11, parted, in [s]: it ends the horizon;
-            None if they did not.
-        lost_s: Time at which the latter differed by 0.1 rad or m, in [s]; None if they did not.
+        q: Positions at these times, (k, n).
+        error: Distance of the two runs, in [rad] or [m]; smaller errors are not resolved.
+        methods: Descriptions of the two methods; q is from the first.
+        horizon_s: End of the reference, in [s].
+        parted_s: Time at which the two runs, or runs at tolerances of 3e-14 and 1e-11, parted, in [s]. It ends the
+            horizon. None if they did not part.
+        lost_s: Time at which the runs at these tolerances differed by 0.1 rad or m, in [s]; None if they did not.
     """
 
     t: np.ndarray = field(metadata=UNREPORTED)
@@ -93,11 +94,11 @@ class Reference(Value):
 
     @reported
     def records(self) -> int:
-        """Number of times at which errors are looked at."""
+        """Number of records after the start, at which errors are evaluated."""
         return len(self.t) - 1
 
     def distance(self, run: Run) -> float:
-        """Largest |q − q_ref| of a run over joints and records; inf if it diverged."""
+        """Return the largest |q − q_ref| of a run over joints and records; inf if it diverged."""
         return np.inf if run.q is None else float(_distance(self.t, self.q, run)[1].max())
 
 
@@ -105,7 +106,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
     """Return the setup up to the horizon, and its reference.
 
     Raises:
-        HorizonError: If there is none.
+        HorizonError: If the motion has no reference.
     """
     requested = setup.duration_s
     parted = lost = None
@@ -124,16 +125,16 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
             error = max(float(other.distance.max()), _ULPS * np.finfo(float).eps * size)
             return setup, Reference(run, q, error, (first, other.words), setup.duration_s, parted, lost)
         parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
-        if end < _LEAST * requested:
+        if end < _MIN_HORIZON * requested:
             raise HorizonError(
-                f"{first} and {other.words} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
-                " measured; take a shorter run, or a start that is less sensitive"
+                f"{first} and {other.words} part within {_MIN_HORIZON:g} of the duration, at t = {end:.2g} s: no"
+                " error can be measured; use a shorter run, or a less sensitive start"
             )
         setup = replace(setup, duration_s=end, record_every_s=0.0)
 
 
 def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
-    """Words for the tightest run that ends in time, its records and its positions there."""
+    """Return the description, record times and positions of the tightest run that ends in time."""
     for tight in _FIRST:
         description = f"{tight.name}, rtol {tight.rtol:g}"
         budget.report(f"reference: {description}")
@@ -141,15 +142,18 @@ def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
         if run is not None and run.q is not None:
             return description, run.t, run.q
     raise HorizonError(
-        f"no run of {setup.duration_s:g} s ends by {' or '.join(tight.name for tight in _FIRST)} at tight tolerances:"
-        " take a shorter run, a larger budget, or look at rd.simulate(…).summary"
+        f"no run of {setup.duration_s:g} s by {' or '.join(tight.name for tight in _FIRST)} finishes at tight"
+        " tolerances; use a shorter run or a larger budget, or see rd.simulate(…).summary"
     )
 
 
 def _rough_ends(
     setup: Setup, t: np.ndarray, q: np.ndarray, size: float, budget: Budget
 ) -> tuple[float | None, float | None]:
-    """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
+    """Return the times at which a run with a looser tolerance parts from the first and has nothing left in common.
+
+    A time is None if this does not happen.
+    """
     run = _in_time(replace(setup, method=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
     if run is None or run.q is None:
         return None, None
@@ -158,7 +162,7 @@ def _rough_ends(
 
 
 def _in_time(setup: Setup, budget: Budget) -> Run | None:
-    """Run a setup; None if it takes too long."""
+    """Run a setup; return None if it takes too long."""
     with budget.apart():
         warmed(setup)
     with suppress(OvertimeError):
@@ -167,14 +171,14 @@ def _in_time(setup: Setup, budget: Budget) -> Run | None:
 
 
 def _longest(budget: Budget) -> float:
-    """Time that a run may take, in [s]."""
-    return max(_SHARE * budget.seconds, _LEAST_S)
+    """Return the time that a reference run may take, in [s]."""
+    return max(_REFERENCE_FRACTION * budget.seconds, _MIN_LIMIT_S)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Other:
-    """A run by another method: its distance from the first one at times, and whether shorter steps win nothing."""
+    """A run by another method, with its distance from the first at times t; `refined` if shorter steps gain nothing."""
 
     words: str
     t: np.ndarray
@@ -183,54 +187,55 @@ class _Other:
 
 
 def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Other:
-    """The finest run by another method."""
+    """Return the finest run by another method."""
     for name in _SECOND:
         try:
             setup_of_other = replace(setup, method=method(name))
-        except QueryError:  # it cannot end its steps where joints are held, say
+        except QueryError:  # for example, its steps cannot end where joints are held
             continue
         if runs := list(_refined(setup_of_other, t, q, budget)):
             return runs[-1]
     raise HorizonError(
-        f"no run by {' or '.join(_SECOND)} ends within {_longest(budget):.2g} s: take a larger budget, or a shorter run"
+        f"no run by {' or '.join(_SECOND)} finishes within {_longest(budget):.2g} s; use a larger budget or a shorter"
+        " run"
     )
 
 
 def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
-    """Runs with ever shorter steps, until these win nothing or take too long."""
+    """Return runs with shorter and shorter steps, until these gain nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
     for step in step_ladder(setup.record_every_s, 1):
         words = f"{setup.method.name}, step {step:.3g} s"
         budget.report(f"reference: {words}")
         run = _in_time(replace(setup, step_s=step), budget)
-        late += run is None  # steps that are too long may bring forth a motion that takes longer
-        if late == _LATE:
+        late += run is None  # steps that are too long may lead to a motion that takes longer
+        if late == _MAX_LATE:
             return
         if run is not None and run.q is not None:
             times, distance = _distance(t, q, run)
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
-            orderly = distance[1] < _ORDERLY
-            refined = bool((orderly and size > before - _STAGNANT) or distance.max() < _ENOUGH[setup.engine])
-            yield _Other(words, times, distance, refined)
-            if refined or 2 * run.time_s > limit:
+            is_orderly = distance[1] < _ORDERLY
+            is_refined = bool((is_orderly and size > before - _STAGNANT) or distance.max() < _ENOUGH[setup.engine])
+            yield _Other(words, times, distance, is_refined)
+            if is_refined or 2 * run.time_s > limit:
                 return
-            before = size if orderly else np.inf
+            before = size if is_orderly else np.inf
 
 
 def _distance(t: np.ndarray, q: np.ndarray, run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Times that the records share with those of a run, (k,), and the largest distance over joints there, (k,)."""
+    """Return the times that the records share with a run, (k,), and the largest distance over joints there, (k,)."""
     place = common(run.t, t)
-    met = place >= 0
-    return t[place[met]], np.abs(np.asarray(run.q)[met] - q[place[met]]).max(axis=1)
+    is_shared = place >= 0
+    return t[place[is_shared]], np.abs(np.asarray(run.q)[is_shared] - q[place[is_shared]]).max(axis=1)
 
 
 def _passes(t: np.ndarray, distance: np.ndarray, level: float) -> float | None:
-    """The first time at which a distance passes a level, by its logarithm between records; None if it never does."""
+    """Return the first time at which a distance exceeds a level, by its logarithm between records, or None."""
     above = np.flatnonzero(distance > level)
     if not len(above):
         return None
-    both = [int(above[0]) - 1, int(above[0])]
-    return float(np.interp(np.log(level), np.log(np.maximum(distance[both], 1e-17)), t[both]))
+    bracket = [int(above[0]) - 1, int(above[0])]
+    return float(np.interp(np.log(level), np.log(np.maximum(distance[bracket], 1e-17)), t[bracket]))
 
 
 @final
@@ -239,11 +244,10 @@ class PastHorizon:
     """The finest run of a method over the whole requested time.
 
     Attributes:
-        name: Of the method.
+        name: Name of the method.
         setting: Step, in [s], or relative tolerance.
-        energy: Largest residual of the energy ledger, as a part of the energy exchanged.
-        returned: Distance from the start of the run there and back, in [rad] or [m]; None if it does not return, or
-            the motion is driven or loses energy.
+        energy: Largest residual of the energy ledger, as a fraction of the energy exchanged.
+        returned: Return error |q − q₀|, in [rad] or [m]; None if the motion is driven or dissipates energy.
     """
 
     name: str
@@ -253,22 +257,26 @@ class PastHorizon:
 
 
 def past_horizon(
-    setup: Setup, horizon_s: float, ladders: Iterable[ToleranceLadder], integrators: Mapping[str, Any], budget: Budget
+    setup: Setup,
+    horizon_s: float,
+    ladders: Iterable[ToleranceLadder],
+    integrators: Mapping[str, Integrator | Adaptive],
+    budget: Budget,
 ) -> tuple[PastHorizon, ...]:
-    """Return energy and distance of return of each method past the horizon.
+    """Return energy and return error of each method past the horizon.
 
     Args:
-        setup: Of the whole time.
-        horizon_s: Up to which errors were measured.
-        ladders: What was measured; the first one of each method counts.
+        setup: The setup over the whole duration.
+        horizon_s: The horizon, up to which errors were measured.
+        ladders: The measured ladders; the first ladder of each method is used.
         integrators: The methods, by name.
-        budget: Of which a run may take a fiftieth.
+        budget: The time budget; a run may take a fiftieth of it.
     """
-    found: dict[str, PastHorizon] = {}
-    longest, setup = _PART * budget.seconds, recorded(setup, setup.duration_s)
+    results: dict[str, PastHorizon] = {}
+    longest, setup = _RUN_FRACTION * budget.seconds, recorded(setup, setup.duration_s)
     for ladder in ladders:
         in_time = [p for p in ladder.points if isfinite(p.error) and p.time_s * setup.duration_s / horizon_s < longest]
-        if ladder.peer or not ladder.events or ladder.method in found or not in_time:
+        if ladder.peer or not ladder.events or ladder.method in results or not in_time:
             continue
         budget.report(f"beyond the horizon: {ladder.name}")
         with suppress(OvertimeError, RobotDynError):
@@ -277,12 +285,12 @@ def past_horizon(
             finest = at_setting(finest, setting)
             with budget.apart():
                 warmed(finest)
-            found[ladder.method] = PastHorizon(ladder.method, setting, *_there_and_back(finest, longest))
-    return tuple(found.values())
+            results[ladder.method] = PastHorizon(ladder.method, setting, *_there_and_back(finest, longest))
+    return tuple(results.values())
 
 
 def _there_and_back(setup: Setup, longest: float) -> tuple[float, float | None]:
-    """Energy and distance of return."""
+    """Return the energy residual and the return error of a run."""
     there, returned = _run(setup, longest), None
     if setup.controller is None and all(isinstance(effect, Conservative) for effect in setup.plant.effects):
         back = _run(replace(setup, q0=there.q[-1], v0=-there.v[-1]), longest)

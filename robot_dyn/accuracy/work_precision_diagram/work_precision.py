@@ -1,4 +1,4 @@
-"""What a digit costs: error against time and evaluations of every method that can take a motion, and of other programs.
+"""Work-precision study: error against time and evaluations, of every suitable method and of other programs.
 
 error = max over joints and records of |q − q_ref|
 """
@@ -8,7 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, log10
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.accuracy.work_precision_diagram.measurement import measure
 from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
@@ -22,14 +25,16 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
     switches,
     whole,
 )
-from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.peers import methods_of_peers
 from robot_dyn.accuracy.work_precision_diagram.reference_run import PastHorizon, Reference, past_horizon, reference
+from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Block, Table, number_or_dash
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import function, instance, integer, number, truth
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration, joint_units
@@ -41,13 +46,13 @@ from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
-# In this order, should the budget end: first what is most used and what costs least.
+# Measured in this order, in case the budget ends: the most used and the fastest methods first.
 _FIRST = ("DOP853", "RK4", "DP8", "Euler", "Rodas5P", "GaussLegendre6", "GaussLegendre4", "Midpoint")
-_MOST_REPEATS, _MOST_DIGITS = 1000, 20
-_DIGITS = (3, 6, 9)  # of the columns
+_MAX_REPEATS, _MAX_DIGITS = 1000, 20
+_DIGITS = (3, 6, 9)  # columns of the table
 _OWN = "robot_dyn"  # this program
-_USUAL_DIGITS = 6  # digits, of the sentence
-_ENOUGH = 5  # methods of a sentence: with so many, none that is extrapolated is named
+_USUAL_DIGITS = 6  # in the sentence
+_ENOUGH = 5  # with this number of measured methods, the sentence names no extrapolated one
 _ALWAYS_NAMED = ("RK4", "RK4 (without events)", "Euler")
 
 
@@ -57,23 +62,23 @@ class WorkPrecision(Result):
     """Error against work of the methods for one motion.
 
     Attributes:
-        robot: Its name.
-        acting: Descriptions of what acts.
-        unit: Of errors, "rad", "m" or both.
+        robot: Name of the robot.
+        acting: Descriptions of gravity, effects and control.
+        unit: Unit of errors, "rad", "m" or both.
         duration_s: The requested duration, in [s].
-        reference: What errors are measured against, and up to when.
+        reference: The reference solution up to the horizon.
         ladders: The runs of each method in each engine, and of each program.
-        left_out: What was left out, and why.
-        environment: Versions and processor.
-        budget_s: That was allowed, in [s].
-        spent_s: That was spent, without compiling, in [s].
-        past_horizon: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
+        left_out: Methods that were left out, with reasons.
+        environment: Software versions and processor.
+        budget_s: Time budget, in [s].
+        spent_s: Time spent, without compiling, in [s].
+        past_horizon: For chaotic motion, energy and return error over the whole duration, by method; otherwise empty.
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.work_precision_diagram.diagram"
     columns: ClassVar[tuple[str, ...]] = (
         "method", "engine", "events", "by", "setting", "steps", "evaluations", "error", "energy", "time_s", "repeats",
-        "believed", "repeatable", "on_front",
+        "resolved", "repeatable", "on_front",
     )  # fmt: skip
     robot: str
     acting: tuple[str, ...]
@@ -89,30 +94,31 @@ class WorkPrecision(Result):
 
     @property
     def basis(self) -> Iterator[str]:
-        """What acts, what errors are measured against, and where the horizon is cut, a line each."""
-        of = self.reference
+        """Lines with the setup, the definition of errors with the reference, and the horizon if it is cut."""
+        reference = self.reference
+        first, second = reference.methods
         yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
         yield (
-            f"error: largest |q − q_ref| over joints and {of.records} records in {of.horizon_s:g} s, in {self.unit};"
-            f" reference: {of.methods[0]}, {of.error:.1e} from {of.methods[1]}: no error below that is believed"
+            f"error: largest |q − q_ref| over joints and {reference.records} records in {reference.horizon_s:g} s, in"
+            f" {self.unit}; reference: {first}, {reference.error:.1e} from {second}: smaller errors are not resolved"
         )
-        if of.parted_s is not None:
-            lost = "" if of.lost_s is None else f", and differ by 0.1 at {of.lost_s:.3g} s"
+        if reference.parted_s is not None:
+            lost = "" if reference.lost_s is None else f", and differ by 0.1 at {reference.lost_s:.3g} s"
             yield (
-                f"horizon: {of.horizon_s:g} s of {self.duration_s:g} s: beyond it runs at tight tolerances part from"
-                f" each other{lost}"
+                f"horizon: {reference.horizon_s:g} s of {self.duration_s:g} s: beyond it, runs at tight tolerances part"
+                f" from each other{lost}"
             )
 
     def tables(self) -> Iterator[Block]:
-        """What it rests on, and a line for each method."""
+        """The basis, a line for each method, and the runs past the horizon."""
         yield from self.basis
         yield self._table_of_ladders([digits for digits in _DIGITS if 10.0**-digits >= self.reference.error])
-        yield "times of prepared runs, the least of runs that take turns; * the least; ( ) extrapolated by the order"
+        yield "times: least time of prepared runs that take turns; * the least; ( ) extrapolated by the order"
         if self.past_horizon:
             yield from self._beyond_horizon()
 
     def _table_of_ladders(self, columns: list[int]) -> Table:
-        """A row for each method: orders, what so many digits cost, and the finest run."""
+        """Return a row for each method: orders, time for a number of digits, and the finest run."""
         headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
         best = {digits: min((p.value for _, p in self.digits(10.0**-digits)), default=0.0) for digits in columns}
         rows = []
@@ -123,40 +129,40 @@ class WorkPrecision(Result):
                 shown = "—" if price is None else f"({price})" if price.extrapolated else str(price)
                 cells.append(shown + " *" * (price is not None and price.value == best[digits]))
             finest = min(ladder.points, key=lambda point: point.error)
-            known = finest.error > self.reference.error
-            error = number_or_dash(finest.error, 2) if known else f"< {self.reference.error:.0e}"
+            is_resolved = finest.error > self.reference.error
+            error = number_or_dash(finest.error, 2) if is_resolved else f"< {self.reference.error:.0e}"
             orders = ["—" if order is None else f"{order:.2g}" for order in (ladder.order, ladder.measured_order)]
             rows.append((ladder.name, *orders, *cells, error, format_duration(finest.time_s)))
         return Table(headings, tuple(rows), right=headings[1:])
 
     def _beyond_horizon(self) -> Iterator[Block]:
-        """Energy and the way back where no error can be measured, a line for each method."""
+        """Energy and return error past the horizon, a line for each method."""
         yield ""
-        yield f"over all of {self.duration_s:g} s, where no error can be measured, the finest runs:"
+        yield f"over the whole {self.duration_s:g} s, where no error can be measured, the finest runs:"
         headings, rows = ("method", "setting", "energy", "there and back"), []
         for run in self.past_horizon:
             back = "—" if run.returned is None else f"{run.returned:.1e}"
             rows.append((run.name, f"{run.setting:.3g}", f"{run.energy:.1e}", back))
         yield Table(headings, tuple(rows), right=headings[1:])
-        yield "energy: largest residual, as a part of the energy exchanged; there and back: |q − q₀|"
-        yield f"in {self.unit} of a run that turns round at the end, where nothing drives it or takes energy"
+        yield "energy: largest residual, as a fraction of the energy exchanged; there and back: |q − q₀|"
+        yield f"in {self.unit} after a run that is reversed at the end, for motion without drive or dissipation"
 
     @property
     def front(self) -> tuple[tuple[ToleranceLadder, Point], ...]:
-        """The runs that no other one beats in error and time, from coarse to fine (Pareto front).
+        """The Pareto front: runs that no other run beats in both error and time, from coarse to fine.
 
-        Those below the error of the reference do not take part.
+        Runs below the error of the reference are excluded.
         """
-        believed = [(ladder, p) for ladder in self.ladders for p in ladder.points if p.believed and isfinite(p.error)]
+        resolved = [(ladder, p) for ladder in self.ladders for p in ladder.points if p.resolved and isfinite(p.error)]
         front: list[tuple[ToleranceLadder, Point]] = []
-        for ladder, point in sorted(believed, key=lambda run: (run[1].time_s, run[1].error)):
+        for ladder, point in sorted(resolved, key=lambda run: (run[1].time_s, run[1].error)):
             if not front or point.error < front[-1][1].error:
                 front.append((ladder, point))
         return tuple(front)
 
     @reported
-    def rows(self) -> list[Mapping[str, Any]]:
-        """The runs, one after the other: what their ladder is, what was measured, and whether no other one beats it."""
+    def rows(self) -> list[Mapping[str, object]]:
+        """The runs in sequence: their ladder, the measured values, and whether they are on the Pareto front."""
         front = [point for _, point in self.front]
         return [
             {name: getattr(ladder, name) for name in self.columns[:4]}
@@ -167,116 +173,118 @@ class WorkPrecision(Result):
         ]
 
     def digits(self, error: float) -> list[tuple[ToleranceLadder, Price]]:
-        """Return what an error costs in time by each method whose runs show it, the cheapest first.
+        """Return the time to reach an error by each method for which it can be estimated, the fastest first.
 
         Args:
-            error: In [rad] or [m].
+            error: The error, in [rad] or [m].
 
         Raises:
-            QueryError: If it is not positive.
+            QueryError: If the error is not positive.
         """
         error = number("error", error, above=0)
         prices = [(ladder, price) for ladder in self.ladders if (price := ladder.price(error)) is not None]
-        return sorted(prices, key=lambda each: each[1].value)
+        return sorted(prices, key=lambda pair: pair[1].value)
 
     @property
     def usual_digits(self) -> int:
-        """6, or as many digits as were reached."""
-        best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
+        """6, or the number of digits reached if it is smaller."""
+        best = min((p.error for ladder in self.ladders for p in ladder.points if p.resolved), default=1.0)
         return min(_USUAL_DIGITS, floor(-log10(max(best, self.reference.error))))
 
     @reported
     def sentence(self) -> str:
-        """What 6 digits cost, or as many as were reached, in a sentence."""
+        """The time that 6 digits take, or the digits reached if fewer, in one sentence."""
         return self.sentence_of(self.usual_digits)
 
     def sentence_of(self, digits: int) -> str:
-        """Return what so many digits cost, in a sentence.
+        """Return a sentence with the time that a number of digits takes.
 
         Args:
-            digits: Errors of at most 10^−digits.
+            digits: Number of digits, for errors of at most 10^−digits.
 
         Raises:
             QueryError: If it is not a whole number from 0 to 20.
         """
-        digits = integer("digits", digits, most=_MOST_DIGITS)
+        digits = integer("digits", digits, most=_MAX_DIGITS)
         if not self.ladders:
-            return "no method was measured: see what was left out"
+            return "no method was measured; see left_out"
         parts = [
             f"{ladder.name} would take {price} (extrapolated)" if price.extrapolated else f"{ladder.name} {price}"
             for ladder, price in named(self, digits)
         ]
         if not parts:
-            return f"{digits} digits of q were reached by no run"
+            return f"no run reached {digits} digits of q"
         return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
 
 
 def work_precision(
     what: Setup | Plant | Dynamics,
-    q0: Any = None,
-    v0: Any = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
     *,
     duration_s: float | None = None,
-    controller: Any = None,
-    methods: Sequence[Any] | None = None,
+    controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None = None,
+    methods: Sequence[str | Integrator | Adaptive] | None = None,
     peers: bool = True,
     budget_s: float = 30.0,
     repeats: int = 25,
     on_progress: Callable[[float, str], object] | None = None,
 ) -> WorkPrecision:
-    """Error against time and evaluations of all methods for one motion.
+    """Measure error against time and evaluations of all methods for one motion.
 
-    Method, step, tolerances, record period, error estimate and events of a setup are not used. Its engine is:
-    "auto" stands for both.
+    Method, step, tolerances, record period, error estimate and events of a setup are not used. The engine of a setup is
+    used; "auto" means both engines.
 
     Args:
-        what: What moves: a setup, or a plant or robot with a start.
-        q0: Position at the start, (n,), in [rad] or [m]; required unless `what` is a setup.
-        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
-        duration_s: In [s]; that of the setup, or 1, unless given. Chaotic motion is cut earlier.
-        controller: As of a setup.
-        methods: Names of `rd.integrate.method`, or methods; all of these unless given.
-        peers: Whether other programs that are installed and can do the motion run too.
-        budget_s: Time to spend, compiling not counted, in [s].
-        repeats: How often a run is timed at most, while the budget lasts: less often if its time repeats (`Point`).
-        on_progress: Called with the time spent, in [s], and with what is being run.
+        what: A setup, or a plant or robot with a start.
+        q0: Initial position, (n,), in [rad] or [m]; required unless `what` is a setup.
+        v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
+        duration_s: Duration, in [s]; by default that of the setup, or 1. Chaotic motion is cut earlier.
+        controller: Controller, see `Setup`; by default that of the setup, or none.
+        methods: Methods, or names for `rd.integrate.method`; by default all of these.
+        peers: True to run other installed programs too, if they can simulate the motion.
+        budget_s: Time budget, compiling not included, in [s].
+        repeats: Largest number of timings of a run, while the budget lasts; fewer if its time repeats (`Point`).
+        on_progress: Called with the time spent, in [s], and the name of the current run.
 
     Raises:
-        QueryError: If an argument is wrong.
-        HorizonError: If the motion has no reference.
+        QueryError: If an argument is invalid.
+        HorizonError: If the motion has no reference solution.
     """
-    given = {"duration_s": duration_s, "controller": controller}
-    setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
+    options = {"duration_s": duration_s, "controller": controller}
+    setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in options.items() if x is not None})
     if methods is None:
         methods = [*_FIRST, *(name for name in METHODS if name not in (*_FIRST, AUTO))]
     instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'RK4']")
-    integrators = [as_method(each) for k, each in enumerate(methods) if each not in methods[:k]]
-    if any(each.name == AUTO for each in integrators):
-        raise QueryError(f"methods: {AUTO!r} is one of {EXPLICIT!r} and {STIFF!r}; name these")
+    integrators = [as_method(method) for k, method in enumerate(methods) if method not in methods[:k]]
+    if any(method.name == AUTO for method in integrators):
+        raise QueryError(f"methods: {AUTO!r} uses {EXPLICIT!r} or {STIFF!r}; name these instead")
     truth("peers", peers)
-    integer("repeats", repeats, least=1, most=_MOST_REPEATS)
-    budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
+    integer("repeats", repeats, least=1, most=_MAX_REPEATS)
+    budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, task)"))
     setup, engines, left_out = _engines(whole(setup))
-    requested, everything = setup.duration_s, setup
+    whole_setup = setup
     setup, exact = reference(setup, budget)
     integrators, unable = _able(setup, integrators)
-    variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
-    candidates = [own(setup, each, engine, events) for engine, events in variants for each in integrators]
+    variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(name, True) for name in engines[1:]]
+    candidates = [own(setup, method, engine, events) for engine, events in variants for method in integrators]
     with budget.apart():  # other programs are loaded, and build their models
-        others, refused = found(setup) if peers else ([], [])
-    place = len(integrators)  # programs in machine code come before what is interpreted, which takes longest
+        others, refused = methods_of_peers(setup) if peers else ([], [])
+    place = len(integrators)  # programs in machine code precede interpreted runs, which take longest
     candidates[place:place] = others
     ladders, ended = measure(candidates, exact, budget, repeats)
     left_out += unable + refused + ended
-    cut = exact.parted_s is not None and INTERRUPTED not in ended
-    later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()
-    dynamics: Any = setup.plant.dynamics
+    later = ()
+    if exact.parted_s is not None and INTERRUPTED not in ended:
+        by_name = {method.name: method for method in integrators}
+        later = past_horizon(whole_setup, exact.horizon_s, ladders, by_name, budget)
+    dynamics = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
         robot=getattr(dynamics, "name", type(dynamics).__name__),
         acting=acting(setup),
         unit=joint_units("q", types),
-        duration_s=requested,
+        duration_s=whole_setup.duration_s,
         reference=exact,
         ladders=ladders,
         left_out=tuple(left_out),
@@ -288,7 +296,7 @@ def work_precision(
 
 
 def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
-    """The setup in the first of the engines that it asks for and that can run it, all of these, and why not others."""
+    """Return the setup in the first engine it may use, the names of all of these, and notes on those left out."""
     if setup.engine != "auto":
         return setup, (setup.engine,), []
     compiled = replace(recorded(setup, setup.duration_s), engine=COMPILED)
@@ -299,19 +307,22 @@ def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
     return replace(setup, engine=COMPILED), (COMPILED, INTERPRETED), []
 
 
-def _able(setup: Setup, integrators: list[Any]) -> tuple[list[Any], list[str]]:
-    """The methods that take the setup, and why not the others."""
-    able, why = [], []
-    for each in integrators:
+def _able(setup: Setup, integrators: list[Integrator | Adaptive]) -> tuple[list[Integrator | Adaptive], list[str]]:
+    """Return the methods that can run the setup, and notes on the others."""
+    able, left_out = [], []
+    for method in integrators:
         try:
-            able.append(replace(setup, method=each).method)
+            able.append(replace(setup, method=method).method)
         except QueryError as error:
-            why.append(f"{each.name}: {error}")
-    return able, why
+            left_out.append(f"{method.name}: {error}")
+    return able, left_out
 
 
 def programs(result: WorkPrecision, error: float) -> Iterator[str]:
-    """What an error takes by the cheapest method of each program, this library first; and what was left out."""
+    """Return lines with the time to reach an error by the fastest method of each program, this library first.
+
+    Methods that were left out follow.
+    """
     best: dict[str, tuple[ToleranceLadder, Price]] = {}
     for ladder, price in result.digits(error):
         best.setdefault(program_of(ladder), (ladder, price))
@@ -325,27 +336,27 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
             yield f"  {name}: {price}{times}{' (extrapolated)' * price.extrapolated}"
         else:
             ended = dict.fromkeys(ladder.ended for ladder in result.ladders if program_of(ladder) == program)
-            yield f"  {program}: reached by no run ({'; '.join(ended)})"
-    yield "  times of prepared runs, the least of runs that take turns"
-    yield from (f"  left out: {what}" for what in result.left_out)
+            yield f"  {program}: not reached ({'; '.join(ended)})"
+    yield "  times: least time of prepared runs that take turns"
+    yield from (f"  left out: {note}" for note in result.left_out)
 
 
 def named(result: WorkPrecision, digits: int) -> list[tuple[ToleranceLadder, Price]]:
-    """Return the ladders that the sentence of a result names, with what the digits cost; none if none was reached."""
+    """Return the ladders named in the sentence of a result, with the time that the digits take; empty if none does."""
     prices = result.digits(10.0**-digits)
     measured = [ladder for ladder, price in prices if not price.extrapolated]
     if not measured:
         return []
     ours = [ladder for ladder in measured if not ladder.peer]
     best = [measured[0], *ours[:1], *[ladder for ladder in ours if ladder.events][:1]]
-    chosen: dict[str, tuple[ToleranceLadder, Price]] = {}  # of each program its best method
+    chosen: dict[str, tuple[ToleranceLadder, Price]] = {}  # the best method of each program
     for ladder, price in prices:
         if ladder.peer or ladder.name in _ALWAYS_NAMED or ladder in best:
             chosen.setdefault(program_of(ladder) if ladder.peer else ladder.name, (ladder, price))
-    enough = sum(not price.extrapolated for _, price in chosen.values()) >= _ENOUGH
-    return [(ladder, price) for ladder, price in chosen.values() if not (enough and price.extrapolated)]
+    has_enough = sum(not price.extrapolated for _, price in chosen.values()) >= _ENOUGH
+    return [(ladder, price) for ladder, price in chosen.values() if not (has_enough and price.extrapolated)]
 
 
 def program_of(ladder: ToleranceLadder) -> str:
-    """The program that a ladder is of."""
+    """Return the name of the program of a ladder."""
     return ladder.method.split(" ")[0] if ladder.peer else _OWN

@@ -129,4 +129,4 @@ def _setup(what: str, q: str | None, v: str | None, duration: float | None, opti
     seconds = _DURATION_S if duration is None else duration
     if not (isfinite(seconds) and seconds > 0):
         raise QueryError(f"--duration must be positive, got {seconds:g}")
-    return rd.Setup(rd.Plant(robot), start, arguments.vector("--v", v, names), seconds)
+    return rd.Setup(rd.Plant(robot), start, arguments.vector("--v", v, names), duration_s=seconds)

@@ -32,7 +32,7 @@ def demo(output: str = "demo", force: Force = False) -> None:
     from robot_dyn.scene.starters import starter
     from robot_dyn.simulation.results.run_file import RUN, RunFileError
     from robot_dyn.view.page import PAGE, ReplayError
-    from robot_dyn.view.plots.plots import PICTURES, PlotError
+    from robot_dyn.view.plots.pictures import PICTURES, PlotError
 
     folder = Path(output)
     try:
@@ -54,9 +54,9 @@ def demo(output: str = "demo", force: Force = False) -> None:
         say(*run.summary.split("\n"))
         raise typer.Exit(130)
     with bar(what="drawing"):
-        rd.save_run(run, files["npz"])
-        rd.save_replay(run, files["html"])
-        rd.save_plot(run, files["png"])
+        run.save(files["npz"])
+        rd.replay(run).save(files["html"])
+        rd.plot(run).save(files["png"])
     say(*run.summary.split("\n"))
     say(
         "",

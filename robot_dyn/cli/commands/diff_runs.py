@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import robot_dyn as rd
+from robot_dyn.cli import arguments
 from robot_dyn.cli.application import LOOK, command
 from robot_dyn.cli.options import PRINTED, Results
 
@@ -21,4 +22,4 @@ def diff_runs(a: str, b: str, /, tolerance: float = 1e-06, results: Results = PR
     from robot_dyn.accuracy.run_difference import RunDifference
 
     paths = results.files(RunDifference, a, b)
-    results.give(rd.diff_runs(rd.load_run(a), rd.load_run(b), tolerance=tolerance), paths)
+    results.give(rd.diff_runs(arguments.run(a), arguments.run(b), tolerance=tolerance), paths)

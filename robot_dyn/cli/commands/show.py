@@ -125,7 +125,7 @@ def replay(
             "--dark, --size and --fps are of a video; add --video OUT.mp4, or leave them out: a page is dark where the"
             " browser is"
         )
-    page = rd.replay(*map(rd.load_run, runs), frame=frame, package_dirs=package_dir or (), **view.look)
+    page = rd.replay(*map(arguments.run, runs), frame=frame, package_dirs=package_dir or (), **view.look)
     if film is None:
         view.give(page, file, "run")
         return
@@ -158,13 +158,13 @@ def plot(
         width_mm: Width in mm; text keeps its size.
         paper: For a paper: thin lines, no title, legible in grey.
     """
-    from robot_dyn.view.plots.plots import PICTURES, PlotError
+    from robot_dyn.view.plots.pictures import PICTURES, PlotError
 
     path = target(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
     look = {"theme": "dark" if dark else "light", "style": "paper" if paper else "screen", "width_mm": width_mm}
     with bar(what="drawing"):
-        file = rd.save_plot(rd.load_run(run), path, only=only or (), joints=joint or None, **look)
-    say(f"written: {file}")
+        rd.plot(rd.read(run), only=only or (), joints=joint or None, **look).save(path)
+    say(f"written: {path}")
 
 
 def _film(video: str, size: str, view: PageOptions, inputs: list[str]) -> tuple[Path, tuple[int, int]]:

@@ -1,11 +1,11 @@
-"""Commands on scenes: simulate, explain, sweepable, scene."""
+"""Commands on scenes: simulate, explain, parameters, scene."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -33,27 +33,26 @@ def simulate(
     The exit code is 1 if it diverges. Ctrl-C ends the run and keeps its samples.
 
     Options:
-        output (RUN.npz): Write the run to a file.
+        output (RUN.npz): Save the run: as .npz for replay, plot and diff; or as .csv, .parquet, .nc or .mcap.
         csv (TABLE.csv): Write the samples as a table.
         accuracy (ERROR): Largest error of q to have, in rad and m; pilot runs choose the method.
     """
     from robot_dyn.cli import report
-    from robot_dyn.simulation.export.export import TABLE
-    from robot_dyn.simulation.results.run_file import RUN, RunFileError
+    from robot_dyn.simulation.results.formats.save import TABLE, kinds
+    from robot_dyn.simulation.results.run_file import RunFileError
 
     setup = rd.read_scene(scene)
     if accuracy is not None:
         setup = replace(setup, accuracy=accuracy)
     inputs = [scene, setup.plant.dynamics.description.source]  # pyright: ignore[reportAttributeAccessIssue]
-    writes: list[tuple[Any, Path]] = []
-    for path, kind, write in ((output, RUN, rd.save_run), (csv, TABLE, rd.export)):
+    files: list[Path] = []
+    for path, allowed in ((output, kinds(rd.Trajectory)), (csv, (TABLE,))):
         if path:
-            written = [file for _, file in writes]
-            writes.append((write, target(path, kind, RunFileError, [*inputs, *written], force)))
+            files.append(target(path, allowed, RunFileError, [*inputs, *files], force))
     with bar(setup.duration_s, at_the_end="estimating the error") as advance:
         run = rd.simulate(setup, on_progress=advance)
-    lines, files = run.summary.split("\n"), [partial(write, run, path) for write, path in writes]
-    show(lines, as_json=as_json, document=report.run(run), writes=files)
+    writes = [partial(run.save, path) for path in files]
+    show(run.summary.split("\n"), as_json=as_json, document=report.run(run), writes=writes)
     if run.outcome.ending != "finished":
         raise typer.Exit(130 if run.outcome.ending == "stopped" else 1)
 
@@ -65,9 +64,9 @@ def explain(scene: Scene, /, as_json: Json = False) -> None:
 
 
 @command(ASK)
-def sweepable(scene: Scene, /, as_json: Json = False) -> None:
-    """List the parameters that runs of a scene can sweep."""
-    show(rd.sweepable(rd.read_scene(scene)), as_json=as_json)
+def parameters(scene: Scene, /, as_json: Json = False) -> None:
+    """List the parameters of a scene that can vary from run to run."""
+    show(rd.parameters(rd.read_scene(scene)), as_json=as_json)
 
 
 @command(FILES)

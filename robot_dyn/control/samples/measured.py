@@ -46,7 +46,7 @@ def from_samples(
         arm: The robot.
         source: Path of a CSV file, a data frame, columns by heading in a dict, or an array (m, n) in the order of q.
             Headings are names of joints, with or without a unit, such as "elbow_joint [deg]", or the headings of
-            `rd.export`, such as "q elbow_joint [rad]". Or the path of an MCAP log (.mcap) with ROS 2 messages
+            `run.save`, such as "q elbow_joint [rad]". Or the path of an MCAP log (.mcap) with ROS 2 messages
             sensor_msgs/msg/JointState that name the joints; this needs the extra "data".
         time: Heading of the times, with or without its unit, or the times, (m,), in [s], or the time between samples;
             by default the column "t", "time" or "timestamp", with a unit of s, ms, µs or ns. For a log, "header"

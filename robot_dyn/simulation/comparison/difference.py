@@ -86,8 +86,8 @@ def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
     """Raise a QueryError unless two runs are of one robot and have times in common."""
     names = tuple(run.about.get("robot", "") for run in (a, b))
     if a.joint_names != b.joint_names:
-        of = [f"{name or 'a robot'} ({', '.join(x.joint_names)})" for name, x in zip(names, (a, b), strict=True)]
-        raise QueryError(f"runs of different joints cannot be compared: {of[0]} and {of[1]}; give two of one robot")
+        both = [f"{name or 'a robot'} ({', '.join(x.joint_names)})" for name, x in zip(names, (a, b), strict=True)]
+        raise QueryError(f"runs of different joints cannot be compared: {both[0]} and {both[1]}; give two of one robot")
     if all(names) and names[0] != names[1]:
         raise QueryError(f"runs of different robots, {names[0]} and {names[1]}, cannot be compared; give two of one")
     if not (len(a.t) and len(b.t)):

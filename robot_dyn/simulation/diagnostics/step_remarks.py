@@ -34,14 +34,19 @@ _LOADED = 0.01, 0.96  # of the level of friction: below, the joint rests; above,
 
 
 def remarks(
-    setup: Setup, observer: Observer, of: Observed, t: np.ndarray, samples: np.ndarray, power: dict[str, np.ndarray]
+    setup: Setup,
+    observer: Observer,
+    observed: Observed,
+    t: np.ndarray,
+    samples: np.ndarray,
+    power: dict[str, np.ndarray],
 ) -> tuple[Remark, ...]:
     """Return the remarks on the steps of a run, chatter first.
 
     Args:
         setup: The setup of the run.
         observer: Its observer, closed at the end of the run.
-        of: Its observations.
+        observed: Its observations.
         t: Times of its samples, (m,), in [s].
         samples: q, v and u side by side, (m, 3n).
         power: Power of each source, (m,), in [W].
@@ -51,13 +56,13 @@ def remarks(
     of_run = (
         setup.plant.dynamics.joint_names,
         units,
-        of.visits_of(0),
-        of.episodes_of(0),
+        observed.visits_of(0),
+        observed.episodes_of(0),
         against(setup, t, samples[:, :n]),
     )
     return (
         *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
-        *_creeping(setup, t, v, units), *of_reference(setup, t, of.extremes[0], units),
+        *_creeping(setup, t, v, units), *of_reference(setup, t, observed.extremes[0], units),
     )  # fmt: skip
 
 

@@ -147,12 +147,12 @@ def _by_refinement(
     return estimated.from_refinement(gap, tight)
 
 
-def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
-    """Return the run with magnified rounding as its floor, from companion `of` and the same with a pushed start."""
-    if not len(of.key):  # it diverged before the first shared state: nothing is observed
+def _with_rounding(estimated: Estimated, pushed: Path, companion: Path, units: float = PUSH) -> Estimated:
+    """Return the run with magnified rounding as its floor, from a companion and the same with a pushed start."""
+    if not len(companion.key):  # it diverged before the first shared state: nothing is observed
         return estimated
-    rounds = carried(of, differences(of, pushed, estimated.n) * (PUSH / units), estimated.n)
-    return replace(estimated, floor=np.fmax(estimated.floor, at_states(estimated.path, of, rounds)))
+    rounds = carried(companion, differences(companion, pushed, estimated.n) * (PUSH / units), estimated.n)
+    return replace(estimated, floor=np.fmax(estimated.floor, at_states(estimated.path, companion, rounds)))
 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:

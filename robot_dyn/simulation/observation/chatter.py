@@ -63,19 +63,19 @@ def chatters_of(n: int, W: int, tiles: int) -> list[Chatter]:
     return [Chatter(t[k], ticks[k], u[k], count[k], streak[k], going[k], episodes[k]) for k in range(tiles)]
 
 
-def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
+def tick(chatter: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
     """Record a tick at t with the actuation u (n, W), whose extremes so far are low and high (n, W)."""
-    k = of.ticks[0]
-    before, middle, now = of.u[(k + 1) % 3], of.u[(k + 2) % 3], of.u[k % 3]
+    k = chatter.ticks[0]
+    before, middle, now = chatter.u[(k + 1) % 3], chatter.u[(k + 2) % 3], chatter.u[k % 3]
     copy(now, u)
     for j in range(len(u)):
-        if of.going[j] > 0 or turns(before[j], middle[j], now[j]):
+        if chatter.going[j] > 0 or turns(before[j], middle[j], now[j]):
             for b in range(u.shape[1]):
                 change, next_change = middle[j, b] - before[j, b], now[j, b] - middle[j, b]
-                if change * next_change < 0.0 or of.reversals[j, b] > 0:
-                    count(of, j, b, t, change, next_change, low[:, b], high[:, b])
-    of.t[0] = t
-    of.ticks[0] = k + 1
+                if change * next_change < 0.0 or chatter.reversals[j, b] > 0:
+                    count(chatter, j, b, t, change, next_change, low[:, b], high[:, b])
+    chatter.t[0] = t
+    chatter.ticks[0] = k + 1
 
 
 def turns(before: Array, middle: Array, now: Array) -> bool:
@@ -87,7 +87,7 @@ def turns(before: Array, middle: Array, now: Array) -> bool:
 
 
 def count(
-    of: Chatter, j: int, b: int, t: float, change: float, next_change: float, low: Array, high: Array
+    chatter: Chatter, j: int, b: int, t: float, change: float, next_change: float, low: Array, high: Array
 ) -> None:  # fmt: skip
     """Count a reversal of joint j in run b at the tick before t; end its row if the change is noise."""
     largest = 0.0
@@ -95,30 +95,34 @@ def count(
         largest = max(largest, high[i], -low[i])
     least = max(_PART * max(high[j], -low[j]), _LEAST * largest)
     if change * next_change < -(least**2):
-        if of.reversals[j, b] == 0:
-            of.going[j] += 1
-            of.streak[0, j, b], of.streak[2, j, b] = of.t[0], 0.0
-        of.reversals[j, b] += 1
-        of.streak[1, j, b] = t - of.streak[0, j, b]
-        of.streak[2, j, b] = max(of.streak[2, j, b], abs(change) / 2, abs(next_change) / 2)
-    elif of.reversals[j, b] > 0:
-        close(of, j, b)
+        if chatter.reversals[j, b] == 0:
+            chatter.going[j] += 1
+            chatter.streak[0, j, b], chatter.streak[2, j, b] = chatter.t[0], 0.0
+        chatter.reversals[j, b] += 1
+        chatter.streak[1, j, b] = t - chatter.streak[0, j, b]
+        chatter.streak[2, j, b] = max(chatter.streak[2, j, b], abs(change) / 2, abs(next_change) / 2)
+    elif chatter.reversals[j, b] > 0:
+        close(chatter, j, b)
 
 
-def close(of: Chatter, j: int, b: int) -> None:
+def close(chatter: Chatter, j: int, b: int) -> None:
     """End a row of reversals; it is an episode if it is long enough."""
-    if of.reversals[j, b] >= _REVERSALS:
-        duration, amplitude, largest = of.streak[1, j, b], of.streak[2, j, b], of.episodes[2, j, b]
+    if chatter.reversals[j, b] >= _REVERSALS:
+        duration, amplitude, largest = chatter.streak[1, j, b], chatter.streak[2, j, b], chatter.episodes[2, j, b]
         if amplitude > _OTHER * largest:
-            of.episodes[0, j, b], of.episodes[1, j, b], of.episodes[2, j, b] = of.streak[0, j, b], duration, amplitude
+            chatter.episodes[0, j, b], chatter.episodes[1, j, b], chatter.episodes[2, j, b] = (
+                chatter.streak[0, j, b],
+                duration,
+                amplitude,
+            )
         elif amplitude > largest / _OTHER:
-            of.episodes[1, j, b] += duration
-            of.episodes[2, j, b] = max(largest, amplitude)
-    of.reversals[j, b] = 0
-    of.going[j] -= 1
+            chatter.episodes[1, j, b] += duration
+            chatter.episodes[2, j, b] = max(largest, amplitude)
+    chatter.reversals[j, b] = 0
+    chatter.going[j] -= 1
 
 
-def close_all(of: Chatter) -> None:
+def close_all(chatter: Chatter) -> None:
     """End all current rows after the last tick."""
-    for j, b in np.argwhere(of.reversals > 0) if of.ticks[0] else ():
-        close(of, j, b)
+    for j, b in np.argwhere(chatter.reversals > 0) if chatter.ticks[0] else ():
+        close(chatter, j, b)

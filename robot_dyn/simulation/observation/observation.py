@@ -68,20 +68,20 @@ def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Obser
         array[...] = np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0)
         return array
 
-    of = np.array([level.row for level in levels.levels], np.int64)
+    rows_of = np.array([level.row for level in levels.levels], np.int64)
     sides = np.array([float(level.side) for level in levels.levels])
     bounds, up = tiled(levels.bounds), sides > 0
     inner = np.tile([[-np.inf], [np.inf]], (tiles, 1, rows))
-    np.fmax.at(inner[:, 0].T, of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
-    np.fmin.at(inner[:, 1].T, of[up], np.fmin.reduce(bounds[:, up], axis=2, initial=np.inf).T)
+    np.fmax.at(inner[:, 0].T, rows_of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
+    np.fmin.at(inner[:, 1].T, rows_of[up], np.fmin.reduce(bounds[:, up], axis=2, initial=np.inf).T)
     low, high = (tiled(np.where(np.isnan(start), none, start)) for none in (np.inf, -np.inf))
-    visits = np.full((tiles, 4, len(of), W), np.nan)
+    visits = np.full((tiles, 4, len(rows_of), W), np.nan)
     if (low < inner[:, 0, :, None]).any() or (high > inner[:, 1, :, None]).any():
-        x = tiled(start[of])
+        x = tiled(start[rows_of])
         beyond = sides[:, None] * (x - bounds) > 0
         visits[:, :3] = np.where(beyond, 0.0, np.nan)[:, None]
         visits[:, 3] = np.where(beyond, x, np.nan)
-    first, latest = np.searchsorted(of, np.arange(rows + 1)), np.zeros((tiles, 1))
+    first, latest = np.searchsorted(rows_of, np.arange(rows + 1)), np.zeros((tiles, 1))
     chatters = chatters_of(rows // 3, W, tiles)
     return [
         Observation(low[k], high[k], inner[k], first, sides, bounds[k], visits[k], chatters[k], latest=latest[k])
@@ -92,11 +92,11 @@ def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Obser
 NOTHING = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # of no run
 
 
-def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Array, acted: bool) -> None:
+def observe(observation: Observation, began: float, t: float, q: Array, v: Array, u: Array, acted: bool) -> None:
     """Add a step to an observation.
 
     Args:
-        of: The observation, which is updated.
+        observation: The observation, which is updated.
         began: Start of the step, in [s].
         t: End of the step, in [s].
         q: Positions at its end, (n, W).
@@ -106,33 +106,35 @@ def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Arra
     """
     n = len(u)
     if acted:
-        tick(of.chatter, began, u, of.low[2 * n :], of.high[2 * n :])
-    observe_motion(of, began, t, q, v)
-    look(of, 2 * n, u, began, t, began)
+        tick(observation.chatter, began, u, observation.low[2 * n :], observation.high[2 * n :])
+    observe_motion(observation, began, t, q, v)
+    look(observation, 2 * n, u, began, t, began)
 
 
-def observe_motion(of: Observation, began: float, t: float, q: Array, v: Array) -> None:
+def observe_motion(observation: Observation, began: float, t: float, q: Array, v: Array) -> None:
     """Add a step from `began` to t without its actuation; see `observe` for the arguments."""
-    look(of, 0, q, began, t, t)
-    look(of, len(q), v, began, t, t)
+    look(observation, 0, q, began, t, t)
+    look(observation, len(q), v, began, t, t)
 
 
-def observe_actuation(of: Observation, t: float, u: Array, acted: bool) -> None:
+def observe_actuation(observation: Observation, t: float, u: Array, acted: bool) -> None:
     """Add the actuation (n, W) at an instant, which counts for the time since the previous one."""
     first = 2 * len(u)
     if acted:
-        tick(of.chatter, of.latest[0], u, of.low[first:], of.high[first:])
-    look(of, first, u, of.latest[0], t, t)
-    of.latest[0] = t
+        tick(observation.chatter, observation.latest[0], u, observation.low[first:], observation.high[first:])
+    look(observation, first, u, observation.latest[0], t, t)
+    observation.latest[0] = t
 
 
-def look(of: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
+def look(observation: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
     """Add rows x (n, W), from row `first` on, of a step from `began` to t; x is the value at the time `at`."""
     for j in range(len(x)):
         row = first + j
-        if enclose(of.low[row], of.high[row], x[j], of.inner[0, row], of.inner[1, row]):
-            for k in range(of.first[row], of.first[row + 1]):
-                visit(of.visits[:, k], of.sides[k], of.bounds[k], x[j], began, t, at)
+        if enclose(
+            observation.low[row], observation.high[row], x[j], observation.inner[0, row], observation.inner[1, row]
+        ):
+            for k in range(observation.first[row], observation.first[row + 1]):
+                visit(observation.visits[:, k], observation.sides[k], observation.bounds[k], x[j], began, t, at)
 
 
 def visit(visits: Array, side: float, bounds: Array, x: Array, began: float, t: float, at: float) -> None:
@@ -228,6 +230,6 @@ def observed(
     return Observed(extremes, number, levels.levels, levels.limits.T, visits.T, episodes.T)
 
 
-def _results(of: Observation) -> tuple[Array, ...]:
+def _results(observation: Observation) -> tuple[Array, ...]:
     """Return low, high, visits and episodes."""
-    return of.low, of.high, of.visits, of.chatter.episodes
+    return observation.low, observation.high, observation.visits, observation.chatter.episodes

@@ -8,5 +8,5 @@
 - doubts: the reasons why an estimate ends early or a ledger does not close, and their wording.
 - acting: effects by name, wrenches on links, stops that joints bear on.
 - provenance: texts from which the robot of a run is built again.
-- run_file: files of runs, see `foundations/store.py`.
+- run_file: run files, written by `foundations/store.py`; formats: what `save` writes, by suffix.
 """

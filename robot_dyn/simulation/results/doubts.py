@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import NamedTuple, final
+from typing import final
 
 from robot_dyn.foundations.sentences import Part, Parts, sentence
 from robot_dyn.simulation.dynamics.fastest_motion import MOTION
@@ -48,80 +48,56 @@ class DoubtKind(StrEnum):
     WORK_OF_NO_EFFECT = "work_of_no_effect"
 
 
-class _Sentence(NamedTuple):
-    """The text of a kind of doubt and its remedy."""
-
-    text: Parts
-    remedy: Parts = ()
-
-
 _FINER: Part = "take rtol = {smaller_rtol:.0e}", "take step_s = {smaller_step_s:.0e}"
 _AT = ", at t = {at:.4g} s"
 _LIMIT: Part = "{tenth:.2g} [rad] or [m], a tenth of the motion", "{limit:.2g} rad or m"
-_SENTENCES: Mapping[DoubtKind, _Sentence] = {
-    DoubtKind.ENDED_AT_ONCE: _Sentence(("it ended in its first step",)),
-    DoubtKind.INTERRUPTED: _Sentence(("it was interrupted",)),
-    DoubtKind.IMPLAUSIBLE_SPEED: _Sentence(TOO_FAST),
-    DoubtKind.NO_ORDER_OF_IMPACTS: _Sentence(
-        ("the error of time stepping falls with the step, but from step to step by no order",),
-        ("compare it with step_s / 4, or with method='DOP853'",),
+_SENTENCES: Mapping[DoubtKind, Parts] = {
+    DoubtKind.ENDED_AT_ONCE: ("it ended in its first step",),
+    DoubtKind.INTERRUPTED: ("it was interrupted",),
+    DoubtKind.IMPLAUSIBLE_SPEED: TOO_FAST,
+    DoubtKind.NO_ORDER_OF_IMPACTS: ("the error of time stepping falls with the step, but has no definite order",),
+    DoubtKind.OSCILLATION_DAMPED: (
+        "the energy ledger does not close: ",
+        MOTION,
+        ", which {method} damps in steps longer than {longest_s:.0e} s, so that runs with other steps do not show it",
     ),
-    DoubtKind.OSCILLATION_DAMPED: _Sentence(
-        (
-            "the energy ledger does not close: ",
-            MOTION,
-            ", which {method} damps in steps longer than {longest_s:.0e} s, so that runs with other steps do not show "
-            "it",
-        ),
-        ("take shorter ones",),
+    DoubtKind.TURNS_TOO_FAR: (
+        "a joint turns by {turn:.3g} rad in a step, so that runs with other steps may reach the same angles",
     ),
-    DoubtKind.TURNS_TOO_FAR: _Sentence(
-        ("a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles",),
-        (_FINER,),
+    DoubtKind.FEW_STEPS: ("fewer than 3 steps between ticks, switches or breaks",),
+    DoubtKind.COMPANIONS_DIFFER: ("runs with other steps differ by more than ", _LIMIT),
+    DoubtKind.ROUNDING: ("rounding of q, as the motion magnifies it, exceeds ", _LIMIT),
+    DoubtKind.SWITCHES_TWICE: ("joint {joint!r} switches and switches back within {steps} steps", _AT),
+    DoubtKind.SWITCHES_LAST: ("joint {joint!r} switches in the last step", _AT),
+    DoubtKind.CROSSED_WITHIN_STEP: (
+        "joint {joint!r} passes its {threshold} by {depth:.1e} and leaves it within one step of {step_s:.1e} s",
+        _AT,
     ),
-    DoubtKind.FEW_STEPS: _Sentence(("fewer than 3 steps between ticks, switches or breaks",), (_FINER,)),
-    DoubtKind.COMPANIONS_DIFFER: _Sentence(("runs with other steps differ by more than ", _LIMIT), (_FINER,)),
-    DoubtKind.ROUNDING: _Sentence(
-        ("rounding of q, as the motion magnifies it, exceeds ", _LIMIT), ("take a shorter run",)
+    DoubtKind.ACTS_BETWEEN_STEPS: (
+        "{part} acts between steps after t = {start:g} s and not at their ends; declare its times as `switches`",
     ),
-    DoubtKind.SWITCHES_TWICE: _Sentence(
-        ("joint {joint!r} switches and switches back within {steps} steps", _AT), (_FINER,)
+    DoubtKind.ORDER_NOT_SEEN: ("the order of the method does not show",),
+    DoubtKind.UNDECLARED: ("{part} {lacks}; changes shorter than {shortest_s:.1g} s are not seen",),
+    DoubtKind.ROUNDED_AT_TICKS: ("a value rounded at a tick may be rounded the other way",),
+    DoubtKind.PASSES_WITHIN_STEP: ("{joint!r} passes its {threshold} within a step",),
+    DoubtKind.LAYER_CROSSED: ("{joint!r} crosses a layer of {effect} in a few steps",),
+    DoubtKind.SATURATES: ("a limit cuts the control",),
+    DoubtKind.DIVERGED: ("the run diverged",),
+    DoubtKind.LOOSE_TOLERANCE: ("the tolerance is too loose",),
+    DoubtKind.LONG_STEPS: ("the steps are too long for the motion",),
+    DoubtKind.WORK_OF_POTENTIAL: (
+        "{effect} does {power:.2g} W at t = {at:.4g} s that its potential does not give; its torque must be −∂E/∂q of "
+        "a potential E(q), otherwise declare it Active",
     ),
-    DoubtKind.SWITCHES_LAST: _Sentence(("joint {joint!r} switches in the last step", _AT), (_FINER,)),
-    DoubtKind.CROSSED_WITHIN_STEP: _Sentence(
-        (
-            "joint {joint!r} passes its {threshold} by {depth:.1e} and leaves it within one step of {step_s:.1e} s",
-            _AT,
-        ),
-        (_FINER,),
+    DoubtKind.WORK_OF_NO_EFFECT: (
+        "{power:.2g} W at t = {at:.4g} s belong to no effect; M, C and N of the dynamics must belong to its energies, "
+        "and none of them may depend on time",
     ),
-    DoubtKind.ACTS_BETWEEN_STEPS: _Sentence(
-        ("{part} acts between steps after t = {start:g} s and not at their ends; declare its times as `switches`",),
-        (_FINER,),
-    ),
-    DoubtKind.ORDER_NOT_SEEN: _Sentence(("the order of the method does not show",)),
-    DoubtKind.UNDECLARED: _Sentence(
-        ("{part} {lacks}; changes shorter than {shortest_s:.1g} s are not seen",),
-    ),
-    DoubtKind.ROUNDED_AT_TICKS: _Sentence(("a value rounded at a tick may be rounded the other way",)),
-    DoubtKind.PASSES_WITHIN_STEP: _Sentence(("{joint!r} passes its {threshold} within a step",)),
-    DoubtKind.LAYER_CROSSED: _Sentence(("{joint!r} crosses a layer of {effect} in a few steps",)),
-    DoubtKind.SATURATES: _Sentence(("a limit cuts the control",)),
-    DoubtKind.DIVERGED: _Sentence(("the run diverged",)),
-    DoubtKind.LOOSE_TOLERANCE: _Sentence(("the tolerance is too loose",), (_FINER,)),
-    DoubtKind.LONG_STEPS: _Sentence(("the steps are too long for the motion",), (_FINER,)),
-    DoubtKind.WORK_OF_POTENTIAL: _Sentence(
-        (
-            "{effect} does {power:.2g} W at t = {at:.4g} s that its potential does not give; its torque must be −∂E/∂q "
-            "of a potential E(q), otherwise declare it Active",
-        )
-    ),
-    DoubtKind.WORK_OF_NO_EFFECT: _Sentence(
-        (
-            "{power:.2g} W at t = {at:.4g} s are work of no effect; M, C and N of the dynamics must belong to its "
-            "energies, and none of them may depend on time",
-        )
-    ),
+}
+_REMEDIES: Mapping[DoubtKind, Parts] = {  # of the other kinds, a smaller step or tolerance if the facts name one
+    DoubtKind.NO_ORDER_OF_IMPACTS: ("compare it with step_s / 4, or with method='DOP853'",),
+    DoubtKind.OSCILLATION_DAMPED: ("take shorter steps",),
+    DoubtKind.ROUNDING: ("take a shorter run",),
 }
 
 
@@ -142,12 +118,12 @@ class Doubt:
     @property
     def text(self) -> str:
         """The doubt in a sentence, without its remedy."""
-        return sentence(_SENTENCES[self.kind].text, self.facts)
+        return sentence(_SENTENCES[self.kind], self.facts)
 
     @property
     def remedy(self) -> str:
         """The remedy; empty if there is none."""
-        return sentence(_SENTENCES[self.kind].remedy, self.facts)
+        return sentence(_REMEDIES.get(self.kind, (_FINER,)), self.facts)
 
     @property
     def is_of_steps(self) -> bool:

@@ -31,8 +31,8 @@ def columns(run: TrajectoryData) -> Iterator[Column]:
                 yield from of_joints(row.heading, x, row.unit, types, row.title)
             else:
                 numbers = "xyz" if row.over else map(str, range(1, 1 + x.shape[1]))
-                for of, y in zip(numbers, x.T, strict=True):
-                    yield Column(f"{name} {row.heading}".lstrip(), y, row.unit, of, row.title, row.over)
+                for label, y in zip(numbers, x.T, strict=True):
+                    yield Column(f"{name} {row.heading}".lstrip(), y, row.unit, label, row.title, row.over)
 
 
 def of_joints(heading: str, values: np.ndarray, like: str, types: Types, title: str = "") -> Iterator[Column]:

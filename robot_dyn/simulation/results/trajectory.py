@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Protocol, final, runtime_checkable
 
 import numpy as np
@@ -14,8 +15,10 @@ from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.causes import causes_of
+from robot_dyn.simulation.results.formats.save import save_data
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import TrajectoryData
+from robot_dyn.simulation.results.run_file import write_run
 from robot_dyn.simulation.results.summary import summary
 from robot_dyn.simulation.results.table import columns
 
@@ -110,11 +113,30 @@ class Trajectory(TrajectoryData):
     def _columns(self) -> Iterator[Column]:
         return columns(self)
 
+    def save(self, path: str | Path) -> Path:
+        """Save the run in the format of the suffix of `path`, completely or not at all; return the path.
+
+            .npz      run file: all data, with the robot, for `rd.read`; the default without a suffix
+            .csv      `table`: a row for each sample; `float` restores the numbers
+            .parquet  the same columns, with quantity, joint and unit as metadata
+            .nc       `to_xarray` as netCDF-3, with units as attributes
+            .mcap     ROS 2 messages: q, v, u and its causes; desired q; power, energy
+
+        Formats other than .npz and .csv need `pip install 'robot-dyn[data]'`; all except .csv contain the robot's name,
+        settings, versions and the summary. Numbers are exact to the bit, times in an MCAP log to 1 ns. An existing file
+        is replaced only if it has the same format.
+
+        Raises:
+            RunFileError: If the suffix is unknown, or the file cannot be written.
+            MissingExtraError: If the format needs a package that is not installed.
+        """
+        return save_data(self, path, write_run)
+
     def _repr_html_(self) -> str:
         joints, types = self.joint_names[:MOST_JOINTS], joint_types(self)
         quantities = {"q": "q", "v": "v"} | ({"u": "tau"} if np.any(self.u) else {})
         plots = [
-            plot(f"{name} [{joint_units(of, types)}]", self.t, dict(zip(joints, getattr(self, name).T, strict=False)))
-            for name, of in quantities.items()
+            plot(f"{name} [{joint_units(like, types)}]", self.t, dict(zip(joints, getattr(self, name).T, strict=False)))
+            for name, like in quantities.items()
         ]
         return curves("Trajectory", self.summary, joints, plots, len(self.joint_names) - len(joints))

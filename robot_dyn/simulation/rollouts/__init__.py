@@ -6,5 +6,5 @@
 - lock_step: 64 runs per tile in machine code; one_by_one: runs one after the other on each thread; pool: the threads.
 - rollouts_data: the fields of `Rollouts`; result: `Rollouts`; run: one of its runs as a `Trajectory`; overview:
   remarks, tracking errors, causes of divergence; table: its table.
-- sweepable: the parameters that may differ from run to run; file: files of rollouts.
+- parameters: the parameters that may differ from run to run; run_file: run files of batches; read: the function `read`.
 """

@@ -15,7 +15,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, guard_levels
 from robot_dyn.simulation.observation.observation import Observation, Observed
 from robot_dyn.simulation.results.statistics import Statistics
-from robot_dyn.simulation.rollouts.sweepable import parts_of_run
+from robot_dyn.simulation.rollouts.parameters import parts_of_run
 from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.setup import Setup

@@ -130,7 +130,9 @@ class Tiles:
     def _implausible(self) -> np.ndarray:
         """Return True for runs that finished with a joint above its speed limit, (tiles · LANES,)."""
         n = self.setup.plant.dynamics.n
-        low, high = (np.hstack([getattr(of, side)[n : 2 * n] for of in self.observations]) for side in ("low", "high"))
+        low, high = (
+            np.hstack([getattr(tile, side)[n : 2 * n] for tile in self.observations]) for side in ("low", "high")
+        )
         fast = (np.maximum(-low, high) > cached(self.setup, speed_limits)[:, None]).any(axis=0)
         return fast & (self.why == 0) & ~np.repeat(self.unfinished, LANES)
 

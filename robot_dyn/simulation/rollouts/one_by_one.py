@@ -81,8 +81,8 @@ def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object
     setup, B, began = batch.setup, len(batch), perf_counter()
     levels = batch.levels(setup.plant, setup.controller)
     records, engine = singles(batch, levels, threads, on_progress)
-    made = {i: record for i, record in enumerate(records) if record is not None}
-    t = max((record.t for record in made.values()), key=len, default=np.zeros(1))
+    begun = {i: record for i, record in enumerate(records) if record is not None}
+    t = max((record.t for record in begun.values()), key=len, default=np.zeros(1))
     q0, v0 = batch.q0.T, batch.v0.T
     starts = observation_of(np.vstack([q0, v0, np.full_like(q0, np.nan)]), levels)
     recorded = {name: np.full((B, len(t), size), np.nan) for name, size in batch.sizes.items()}
@@ -91,12 +91,14 @@ def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object
             x[:, 0] = batch.q0 if name == "q" else batch.v0
     label = f"{engine.label}, {B} run{'s' * (B > 1)} one after the other on each thread"
     step = 0.0 if setup.method.controls_error else setup.duration_s / setup.steps
-    steps, evaluations = (max((getattr(x, of) for x in made.values()), default=0) for of in ("steps", "evaluations"))
+    steps, evaluations = (
+        max((getattr(x, name) for x in begun.values()), default=0) for name in ("steps", "evaluations")
+    )
     result = Record(
         setup, t, recorded, [Outcome(Reason.INTERRUPTED, 0.0)] * B, np.zeros(B, np.int64), np.zeros(B, np.int64),
         Statistics(setup.method.name, step, steps, evaluations, perf_counter() - began, engine=label),
-        observed([starts], levels, {i: record.observation for i, record in made.items()}),
+        observed([starts], levels, {i: record.observation for i, record in begun.items()}),
     )  # fmt: skip
-    for i, record in made.items():
+    for i, record in begun.items():
         result.write(i, record)
     return result

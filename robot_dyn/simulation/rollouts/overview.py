@@ -84,10 +84,10 @@ def remarks_of(runs: RolloutsData, run: int, setup: Setup | None, t: np.ndarray,
 def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
     """Yield remarks on the reference of some runs of a batch without their setup; the text may be about another run."""
     for remark in whole.remarks:
-        of = tuple(numbers.index(run) for run in remark.runs if run in numbers)
-        if of and remark.kind in OF_REFERENCES:
+        affected = tuple(numbers.index(run) for run in remark.runs if run in numbers)
+        if affected and remark.kind in OF_REFERENCES:
             elsewhere = {} if remark.runs[0] in numbers else {"elsewhere": "in another run"}
-            yield replace(remark, runs=of, looked=len(numbers), facts=remark.facts | elsewhere)
+            yield replace(remark, runs=affected, looked=len(numbers), facts=remark.facts | elsewhere)
 
 
 def units(runs: RolloutsData) -> Units:
@@ -99,25 +99,25 @@ def units(runs: RolloutsData) -> Units:
 
 def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
     """Yield, for each kind, joint and quantity, the remark on the worst run, with the numbers of the affected runs."""
-    of = runs.observed
+    observed = runs.observed
     named = runs.joint_names, units(runs)
-    amplitudes = of.episodes[:, :, 2]
+    amplitudes = observed.episodes[:, :, 2]
     for joint in np.argsort(-amplitudes.max(axis=0)):
         if amplitudes[:, joint].any():
             worst = int(amplitudes[:, joint].argmax())
-            (remark,) = of_steps(*named, {}, {joint: of.episodes_of(worst)[joint]}, remedy(worst))
+            (remark,) = of_steps(*named, {}, {joint: observed.episodes_of(worst)[joint]}, remedy(worst))
             yield _in_runs(remark, worst, amplitudes[:, joint] > 0)
-    places = {(level.kind, level.row) for level in of.levels}
+    places = {(level.kind, level.row) for level in observed.levels}
     for kind, row in sorted(places, key=lambda place: (KINDS.index(place[0]), place)):
-        both = [k for k, level in enumerate(of.levels) if (level.kind, level.row) == (kind, row)]
-        _, duration, _, value = np.moveaxis(of.visits[:, both], 2, 0)
+        both = [k for k, level in enumerate(observed.levels) if (level.kind, level.row) == (kind, row)]
+        _, duration, _, value = np.moveaxis(observed.visits[:, both], 2, 0)
         some = ~np.isnan(duration).all(axis=1)
         if some.any():
-            beyond = np.abs(value - of.limits[:, both])
+            beyond = np.abs(value - observed.limits[:, both])
             size = np.nansum(duration, axis=1) if kind is RemarkKind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
             worst = int(np.nanargmax(np.where(some, size, np.nan)))
-            visits = {x: visit for x, visit in of.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
-            (remark,) = of_steps(*named, visits, {}, remedy(worst), int(of.instants[worst]))
+            visits = {x: visit for x, visit in observed.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
+            (remark,) = of_steps(*named, visits, {}, remedy(worst), int(observed.instants[worst]))
             yield _in_runs(remark, worst, some)
 
 
@@ -127,15 +127,13 @@ def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
         yield _in_runs(remark, int(gaps.argmax()), gaps > 0)
     if not any(isinstance(effect, DryFriction) for effect in setup.plant.effects):
         return
-    extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
+    extremes, by_joint = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
         plant, controller = runs._parts(setup, run)
-        of_run = with_values(
-            setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]}
-        )  # the values were checked
+        of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]})
         for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
-            of.setdefault(remark.joint, []).append((run, remark))
-    for pairs in of.values():
+            by_joint.setdefault(remark.joint, []).append((run, remark))
+    for pairs in by_joint.values():
         worst, remark = max(pairs, key=lambda pair: pair[1].limit or 0.0)
         yield _in_runs(remark, worst, np.isin(np.arange(len(runs)), [run for run, _ in pairs]))
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 from functools import cached_property
 from operator import index
+from pathlib import Path
 from typing import Any, final, overload
 
 import numpy as np
@@ -16,12 +17,14 @@ from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
+from robot_dyn.simulation.results.formats.save import save_data
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.overview import of_some, overview
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.run import trajectory
+from robot_dyn.simulation.rollouts.run_file import write_rollouts
 from robot_dyn.simulation.rollouts.table import columns, samples
 from robot_dyn.simulation.run.outcome import Reason
 
@@ -49,8 +52,8 @@ class Rollouts(RolloutsData):
         evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
         statistics: Statistics of the longest run; the time is for all runs.
         sources: Names of the sources of work: the control and the effects without a potential.
-        about: Texts common to all runs, as in `Trajectory`, without `params`.
-        params: Values that differ from run to run, by name, (B, n).
+        about: Texts common to all runs, as in `Trajectory`, without `varied`.
+        varied: Values that differ from run to run, by name, (B, n).
         setup: Setup shared by all runs; None for runs read from a file.
         uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
         q0, v0: Initial positions and velocities, (B, n).
@@ -143,6 +146,22 @@ class Rollouts(RolloutsData):
 
     def _variables(self) -> Mapping[str, Variable]:
         return samples(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Save the runs in the format of the suffix of `path`, completely or not at all; return the path.
+
+            .npz      run file: all data except the `setup`, for `rd.read`; the default without a suffix
+            .csv      `table`: a row for each run
+            .parquet  the same columns, with quantity, joint and unit as metadata
+            .nc       `to_xarray`, with all samples, as netCDF-3
+
+        Formats other than .npz and .csv need `pip install 'robot-dyn[data]'`. For more, see `Trajectory.save`.
+
+        Raises:
+            RunFileError: If the suffix is unknown, or the file cannot be written.
+            MissingExtraError: If the format needs a package that is not installed.
+        """
+        return save_data(self, path, lambda runs, file: write_rollouts(runs, file, runs.overview))
 
     def _repr_html_(self) -> str:
         joints = self.joint_names[:MOST_JOINTS]

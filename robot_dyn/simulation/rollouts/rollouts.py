@@ -16,7 +16,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robot_dyn.codegen.parameters import CONTROLLER, Parameter, names_of, parameters, sweepable_parameters
+from robot_dyn.codegen.parameters import CONTROLLER, Parameter, names_of, parameters, variable_parameters
 from robot_dyn.codegen.threads import thread_count
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
@@ -51,12 +51,12 @@ def rollouts(
     q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     *,
-    params: Mapping[str, ArrayLike] | None = None,
+    vary: Mapping[str, ArrayLike] | None = None,
     record: Iterable[str] = ("q", "v"),
     cuts: bool = True,
     numbers: ArrayLike | None = None,
     threads: int | None = None,
-    most_bytes: int = MOST_BYTES,
+    max_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Rollouts:
@@ -75,7 +75,7 @@ def rollouts(
         what: A plant, a robot or a setup.
         q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; by default 0, or those of the setup.
-        params: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.sweepable` lists the names:
+        vary: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.parameters` lists the names:
             gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
             of a kind, "external_wrench 2.wrench"; "gravity", (B, 3); mass in [kg] and centre of mass of a payload on a
             link, "payload_mass:tool0" and "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and
@@ -88,7 +88,7 @@ def rollouts(
         numbers: Numbers of the runs, which determine their noise, (B,); by default 0 to B − 1. The bits of a run depend
             on its number, start and parameters, not on the other runs.
         threads: Number of threads; None for all processors.
-        most_bytes: Refuse to record more than this.
+        max_bytes: Refuse to record more than this.
         on_progress: Called with the mean time that the runs have reached, in [s], some ten times a second; with a
             record period of 0 it grows as tiles of 64 runs end.
         **options: Options of `simulate`, except `estimate_error` and `accuracy`, which have no effect here: no error is
@@ -105,29 +105,29 @@ def rollouts(
         The runs, in the order given. After Ctrl-C they contain the samples recorded up to then.
 
     Raises:
-        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
+        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `max_bytes`.
         TraceError: If a part of the setup cannot be compiled; the message names it.
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
     if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
         setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
-    most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
+    max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1)
     if not setup.method.plain:
         raise QueryError(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
             f" {setup.method.name}: give method='RK4' and its step_s; simulate takes any method"
         )
-    if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
-        raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
-    batch = batch_of(setup, q0, v0, params or {}, record, numbers)
-    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
+    if vary is not None and not (isinstance(vary, Mapping) and all(isinstance(name, str) for name in vary)):
+        raise QueryError(f"vary must give values by name, such as {{'kp': …}}, got {shown(vary)}")
+    batch = batch_of(setup, q0, v0, vary or {}, record, numbers)
+    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), max_bytes, on_progress)
 
 
 def batch_of(
     setup: Setup,
     q0: ArrayLike | None,
     v0: ArrayLike | None,
-    params: Mapping[str, ArrayLike],
+    vary: Mapping[str, ArrayLike],
     record: Iterable[str],
     numbers: ArrayLike | None = None,
 ) -> Batch:
@@ -138,12 +138,12 @@ def batch_of(
     names = setup.plant.dynamics.joint_names
     q = joint_values("q0", setup.q0 if q0 is None else q0, names)
     v = joint_values("v0", setup.v0 if v0 is None else v0, names)
-    sweep = {name: _values(setup, name, x) for name, x in params.items()}
+    sweep = {name: _values(setup, name, x) for name, x in vary.items()}
     counts, n = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}, len(names)
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
-        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
-        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
-        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in vary.items()}
+        rows = f"q0 and v0 ({n},) or (B, {n}), values of vary (B,) or (B, …)"
+        raise QueryError(f"q0, v0 and vary must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
     B = counts.pop()
     q, v = (np.broadcast_to(x, (B, n)) for x in (q, v))
     batch = Batch(setup, q, v, sweep, recorded, None if numbers is None else _numbers(numbers, B))
@@ -175,14 +175,14 @@ def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
 
 
 def run_batch(
-    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
+    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, max_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
     """Return the rollouts of a batch with thresholds `passed`."""
     setup, why = batch.setup, batch.why_one_by_one
     if not cuts and why:
         raise QueryError(f"cuts=False: {why}, so the runs are not in lock step; leave it out")
-    check_batch(setup, len(batch), sum(batch.sizes.values()), most_bytes)
+    check_batch(setup, len(batch), sum(batch.sizes.values()), max_bytes)
     cut = (
         passed is not None or setup.finds_events
     )  # samples are then interpolated within steps, which lock step does not support
@@ -204,7 +204,7 @@ def run_batch(
         work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
         ends=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
-        about=about | setup.about, params=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
+        about=about | setup.about, varied=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
         observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,
     )  # fmt: skip
 
@@ -229,13 +229,13 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """Return the values of a parameter, (B, size)."""
     plant, controller = setup.plant, setup.controller
     declared = parameters(plant.dynamics, plant.effects, controller, (name, "armature", "mass_scale"))
-    matches = [parameter for parameter in declared if parameter.declared.swept and parameter.name == name]
+    matches = [parameter for parameter in declared if parameter.declared.can_vary and parameter.name == name]
     if not matches:
-        raise QueryError(f"params: {_unknown(setup, name)}")
+        raise QueryError(f"vary: {_unknown(setup, name)}")
     size, shape, limits = matches[0].size, matches[0].value.shape, matches[0].declared
     shapes = (("B",), ("B", 1), ("B", size)) if limits.of_joints or size == 1 else (("B", *shape),)
     array = numbers(
-        f"params: {name}", values, *shapes,
+        f"vary: {name}", values, *shapes,
         least=limits.least, above=limits.above, infinite=limits.infinite,
     )  # fmt: skip
     rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), size)))
@@ -262,7 +262,7 @@ def _check(setup: Setup, parameter: Parameter, value: np.ndarray) -> None:
 def _unknown(setup: Setup, name: str) -> str:
     """Return why a name is not a parameter, and the remedy."""
     effects, (part, _, key) = setup.plant.effects, name.rpartition(".")
-    names = [parameter.name for parameter in sweepable_parameters(setup.plant.dynamics, effects, setup.controller)]
+    names = [parameter.name for parameter in variable_parameters(setup.plant.dynamics, effects, setup.controller)]
     if alike := [other for other in names_of(effects) if re.fullmatch(rf"{re.escape(part)} \d+", other)]:
         both = " and ".join(repr(f"{other}.{key}") for other in dict.fromkeys(alike))
         return f"{name} names a coefficient of several effects of the plant; give {both}"

@@ -18,8 +18,8 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
+from robot_dyn.simulation.rollouts.parameters import parts_of_run
 from robot_dyn.simulation.rollouts.reasons import Samples, reason_of
-from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -55,7 +55,7 @@ class RolloutsData(RunData):
     steps: Annotated[np.ndarray, Layout(("B",), "int64")]
     evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     sources: tuple[str, ...]
-    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    varied: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
     q0: Annotated[np.ndarray, Layout(("B", "n"))]
     v0: Annotated[np.ndarray, Layout(("B", "n"))]
     observed: Observed
@@ -128,7 +128,7 @@ class RolloutsData(RunData):
     def _parts(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
         """Return plant and controller of a run, with its parameters and noise."""
         number = run if self.numbers is None else int(self.numbers[run])
-        return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)
+        return parts_of_run(setup, {name: x[run] for name, x in self.varied.items()}, number)
 
 
 def samples_of(runs: RolloutsData, run: int) -> Samples:

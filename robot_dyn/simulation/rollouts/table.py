@@ -14,11 +14,11 @@ from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.results.samples import root_mean_squares
 from robot_dyn.simulation.results.table import Types, of_joints
 from robot_dyn.simulation.rollouts.overview import texts_by_run
+from robot_dyn.simulation.rollouts.parameters import setup_parameter
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
-from robot_dyn.simulation.rollouts.sweepable import swept_parameter
 
 
-def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
+def columns(runs: RolloutsData, overview: Overview) -> Iterator[Column]:
     """Yield columns with a value for each run; the rms is over the samples up to its end, extremes over its steps."""
     types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
     yield Column("run", np.arange(len(runs)))
@@ -29,13 +29,13 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     yield Column("outcome", np.array([end.ending.value for end in runs.ends]))
     yield Column("reason", np.array([outcome.reason.value for outcome in runs.outcomes]))
     yield Column("steps", runs.steps)
-    if of.rms_tracking_error is not None:
+    if overview.rms_tracking_error is not None:
         yield Column(
             "rms tracking error",
-            of.rms_tracking_error,
+            overview.rms_tracking_error,
             "m" if "frame" in runs.about else joint_units("q", types.values()),
         )
-    texts = texts_by_run(of.remarks, len(runs))
+    texts = texts_by_run(overview.remarks, len(runs))
     yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))
     yield Column("remarks", np.array(texts))
     for key in ("v", "u"):
@@ -64,12 +64,12 @@ def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
     """Yield the varied parameters: by joint if the setup declares them so, otherwise numbered if there are several."""
     setup = runs.setup
     varied = (
-        () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.params)
+        () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.varied)
     )
     declared = {parameter.name: parameter.declared for parameter in varied if parameter.declared.of_joints}
     dynamics = None if setup is None else setup.plant.dynamics
-    about = {parameter.name: swept_parameter(parameter, dynamics).unit for parameter in varied}
-    for name, values in runs.params.items():
+    about = {parameter.name: setup_parameter(parameter, dynamics).unit for parameter in varied}
+    for name, values in runs.varied.items():
         columns = values.T
         if name in declared and len(columns) == len(types):
             for (joint, kind), x in zip(types.items(), columns, strict=True):

@@ -109,16 +109,16 @@ def _of_runs(
     """Yield the distinct thresholds of the runs, with the numbers of the runs that have them, (k,)."""
     plant, controller = equation.plant, equation.controller
     varied = parameters(plant.dynamics, plant.effects, controller, sweep)
-    of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
-    of[CONTROLLER] = controller
-    parts = {x.part for x in varied if x.name in sweep and x.part in of and not _always_smooth(of[x.part])}
+    part_of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+    part_of[CONTROLLER] = controller
+    parts = {x.part for x in varied if x.name in sweep and x.part in part_of and not _always_smooth(part_of[x.part])}
     varied = [x for x in varied if x.part in parts]
     values, places = joined(varied), {x.name: rows(varied, x.name) for x in varied if x.name in sweep}
     groups: dict[Any, tuple[dict[Part, Any], list[int]]] = {}
     for run in range(count if parts else 1):
         for name, place in places.items():
             values[place] = sweep[name][run]
-        swept = {part: with_values(of[part], new) for part, new in split(varied, values).items()}
+        swept = {part: with_values(part_of[part], new) for part, new in split(varied, values).items()}
         n = plant.dynamics.n
         declared = tuple(x.thresholds() if part == CONTROLLER else x.thresholds(n) for part, x in swept.items())
         groups.setdefault(declared, (swept, []))[1].append(run)

@@ -298,10 +298,10 @@ def _explained(document: Document, name: str, body: Body, finding: Finding) -> F
     what = f"{finding.what}: suspected {mistakes}"
     if len(candidates) > 1:
         return replace(finding, what=what)
-    (candidate,) = candidates
+    (texts,) = [candidate.texts for candidate in candidates]
     changes = tuple(
         Change(mass if key == "value" else moments, key, text)
-        for key, text in candidate.texts.items()
+        for key, text in texts.items()
         if text != (mass if key == "value" else moments).get(key, "0")
     )
     return replace(finding, what=what, changes=changes, supposed=True)

@@ -43,7 +43,7 @@ def stress(
     arm = options.load(robot)
     with bar(budget, "starting") as spent:
         result = rd.tools.stress.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
-    writes = [] if path is None else [partial(rd.accuracy.save_result, result, path)]
+    writes = [] if path is None else [partial(result.save, path)]
     show(result, as_json=as_json, writes=writes)
     if not result.ok:
         raise typer.Exit(1)

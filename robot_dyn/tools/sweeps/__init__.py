@@ -5,7 +5,7 @@ A sweep is a folder with a file for each finished chunk of runs; chunks without 
     definition         Sweep of a scene or of a function, from_scene: from a scene's table [sweep]
     distributions      uniform, normal, lognormal, triangular, choice; frozen distributions of scipy.stats
     figures            rms_tracking_error, peak, final; samples of runs; functions of a Run by import path
-    execution          run, repeated to resume; read: open a folder
+    execution          run, repeated to resume; read_sweep: open a folder
     results            SweepResult: quantiles, probability and mean as Estimate, Sensitivity, worst, table, report
     errors             SweepError
 

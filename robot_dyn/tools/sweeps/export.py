@@ -8,24 +8,27 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from robot_dyn.foundations import FileKind, SweepError, file_path, needs, save, table_cell, target
+from robot_dyn.foundations import FileKind, SweepError, file_path, needs, save, table_cell
 from robot_dyn.tools.sweeps.folder import Folder
 from robot_dyn.tools.sweeps.rows import FIXED, TEXTS, schema
 from robot_dyn.tools.sweeps.specification import specification
 from robot_dyn.tools.sweeps.sweep import Sweep, heading, parameter_of
 
-_CSV, _PARQUET = FileKind("a table of runs", ".csv", b'"run",'), FileKind("a table", ".parquet", b"PAR1")
+KINDS = (
+    FileKind("a table of runs", ".csv", b'"run",'),
+    FileKind("a table of runs", ".parquet", b"PAR1"),
+    FileKind("a page", ".html", b"<!doctype html>"),
+)
 
 
-def export(sweep: Sweep, folder: Folder, path: str | Path, force: bool) -> Path:
+def write_table(sweep: Sweep, folder: Folder, path: Path) -> Path:
     """Write the rows of a complete folder to a .csv or .parquet file; raise a SweepError if that fails."""
-    path = target(path, (_CSV, _PARQUET), SweepError, inputs_of(folder, path), force)
     is_csv = path.suffix.lower() == ".csv"
     return save(path, lambda stream: _write(sweep, folder, stream, is_csv), SweepError)
 
 
 def inputs_of(folder: Folder, path: str | Path) -> list[Path]:
-    """Return files that an export or a report must not replace: the files of the folder, even under other names."""
+    """Return files that must not be replaced: the files of the folder, even under other names."""
     chunks = filter(Path.exists, map(folder.file, range(folder.count))) if file_path(path, SweepError).exists() else ()
     return [folder.path, *chunks]
 

@@ -38,7 +38,7 @@ class Run(Value):
         desired, tracking_error: Same as in `Trajectory`; None without a reference.
         extremes: Smallest and largest values of q, v and u over all steps, (3, 2, n).
         ended: Time at which the run ended, in [s].
-        params: Start, "q0" and "v0", and values of varying parameters, by name, (size,).
+        varied: Start, "q0" and "v0", and values of varying parameters, by name, (size,).
     """
 
     t: np.ndarray
@@ -51,7 +51,7 @@ class Run(Value):
     tracking_error: np.ndarray | None
     extremes: np.ndarray
     ended: float
-    params: dict[str, np.ndarray]
+    varied: dict[str, np.ndarray]
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -95,7 +95,7 @@ class Runs:
     def _references_vary(self) -> bool:
         controller = self._setup.controller
         names = {name.removeprefix("controller.") for name in (controller.references if controller else ())}
-        return any(name.rpartition(".")[0] in names for name in self._rollouts.params)
+        return any(name.rpartition(".")[0] in names for name in self._rollouts.varied)
 
     @property
     def _setup(self) -> Setup:
@@ -126,7 +126,7 @@ class Runs:
         t, q = np.ascontiguousarray(self.t[known]), select(self.q)
         desired, _, tracking_error = (None,) * 3 if q is None else tracking_of(self._setup_of(i), t, q)
         starts = {name: x for name, x in (("q0", runs.q0), ("v0", runs.v0)) if x is not None}
-        values = {name: x[place] for name, x in (starts | runs.params).items()}
+        values = {name: x[place] for name, x in (starts | runs.varied).items()}
         return Run(
             t=t,
             q=q,
@@ -138,7 +138,7 @@ class Runs:
             tracking_error=tracking_error,
             extremes=self.extremes[i],
             ended=float(self.ended[i]),
-            params=values,
+            varied=values,
         )
 
     def only(self, i: int) -> Runs:
@@ -253,7 +253,7 @@ class UserFigure(Value):
         if self.stated is not None:
             raise SweepError(
                 f"the folder names the function {self.path} as a figure, which is called only if you name it:"
-                f" sw.read(folder, figures={{NAME: {self.path!r}}}), or --figure NAME={self.path}"
+                f" sw.read_sweep(folder, figures={{NAME: {self.path!r}}}), or --figure NAME={self.path}"
             )
         return imported(self.path)
 

@@ -268,7 +268,7 @@ def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
     try:
         sweep = stored.sweep(read_design(path, stored.rows_sha256), path, names)
     except SceneError as error:
-        remedy = "pass the present path of the scene, sw.read(folder, scene=…) or --scene"
+        remedy = "pass the present path of the scene, sw.read_sweep(folder, scene=…) or --scene"
         raise SweepError(f"{path / FILE}: {error}; {remedy}") from None
     stored.check_same(specification(sweep, stored.chunk), path, versions=False)
     return folder_of(path, sweep, stored), sweep

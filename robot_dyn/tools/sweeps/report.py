@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.foundations import Block, FileKind, html_of, inline, page
+from robot_dyn.foundations import Block, html_of, inline, page
 from robot_dyn.report import PAGE, ink, styled
 from robot_dyn.tools.sweeps.sensitivity import bins
 
-KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
 _HEAD = (
     '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'

@@ -27,7 +27,7 @@ from robot_dyn.foundations import (
     truth,
 )
 from robot_dyn.tools.sweeps import statistics
-from robot_dyn.tools.sweeps.export import export, inputs_of
+from robot_dyn.tools.sweeps.export import KINDS, inputs_of, write_table
 from robot_dyn.tools.sweeps.expression import Expression, Truth
 from robot_dyn.tools.sweeps.folder import Folder
 from robot_dyn.tools.sweeps.imported import is_scene
@@ -79,7 +79,7 @@ class SweepResult(Answer):
     def table(self, *names: str) -> dict[str, np.ndarray]:
         """Return columns of all runs, (N,), by their names in `columns`; by default all of them.
 
-        Units are in `units`, and in the headings of `export`.
+        Units are in `units`, and in the headings of saved tables.
         """
         self._check_complete()
         names = names or tuple(self.columns)
@@ -184,36 +184,39 @@ class SweepResult(Answer):
         self.folder.check_samples()
         return self.folder.samples.open(self.sweep.joint_types)
 
-    def export(self, path: str | Path, *, force: bool = False) -> Path:
-        """Write the table of all runs to a .csv or .parquet file, completely or not at all.
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
+        """Save the results in the format of the suffix of `path`, completely or not at all; return the path.
 
-        An existing table is replaced only with `force`, and files in the folder never. In a .csv, texts that a
-        spreadsheet would compute, such as "=1+1", are prefixed with an apostrophe.
+            .csv      table of all runs, with units in the headings; the default without a suffix
+            .parquet  the same table, with units and meanings of columns as metadata
+            .html     report: distributions, failures over the two strongest parameters, worst runs
+
+        An existing file of the same format is replaced only with `force`; files in the folder of the sweep are never
+        replaced. In a .csv, texts that a spreadsheet would compute, such as "=1+1", are prefixed with an apostrophe.
 
         Raises:
-            SweepError: If the file cannot be written, or would replace another one.
+            SweepError: If the suffix is unknown, the sweep is incomplete, or the file exists or cannot be written.
         """
+        force = truth("force", force, error=SweepError)
         self._check_complete()
-        return export(self.sweep, self.folder, path, truth("force", force, error=SweepError))
+        path = target(path, KINDS, SweepError, inputs_of(self.folder, path), force)
+        if path.suffix.lower() == ".html":
+            page = self._report()
+            return save(path, lambda stream: stream.write(page), SweepError)
+        return write_table(self.sweep, self.folder, path)
 
-    def save_report(self, path: str | Path, *, force: bool = False) -> Path:
-        """Write one HTML page: distributions, failures over the two strongest parameters, worst runs.
+    def _report(self) -> bytes:
+        """Return the report as an HTML page."""
+        from robot_dyn.tools.sweeps.report import document
 
-        For `path`, `force` and errors, see `export`.
-        """
-        from robot_dyn.tools.sweeps.report import KIND, document
-
-        inputs = inputs_of(self.folder, path)
-        path = target(path, KIND, SweepError, inputs, truth("force", force, error=SweepError))
         sections = self._failures(), *map(self._of_figure, self.sweep.figures)
-        data = document(self.title, (("Runs", "", self.blocks()), *sections)).encode()
-        return save(path, lambda stream: stream.write(data), SweepError)
+        return document(self.title, (("Runs", "", self.blocks()), *sections)).encode()
 
     @property
     def _repeat(self) -> str:
         """Python code that repeats a run, without the number of the run."""
         source = "" if is_scene(self.sweep.scene) else f", scene={self.sweep.scene!r}"
-        return f"sw.read({str(self.path)!r}{source}).run"
+        return f"sw.read_sweep({str(self.path)!r}{source}).run"
 
     def _failures(self) -> tuple[str, str, list[Block]]:
         """Return the section of the report on failed runs."""

@@ -1,4 +1,4 @@
-"""`run` fills the folder of a sweep by threads, a cluster or a job of an array, or resumes it; `read` opens it.
+"""`run` fills the folder of a sweep by threads, a cluster or a job of an array, or resumes it; `read_sweep` opens it.
 
 A new folder begins with a pilot of 64 runs, which determines the size of chunks: about 2 s of work, constant from then
 on. The pilot measures processor time, because wall time on a busy machine would lead to small chunks.
@@ -47,7 +47,7 @@ def run(
     *,
     threads: int | None = None,
     cluster: Any = None,
-    share: str | None = None,
+    job: str | None = None,
     chunk: int | None = None,
     on_progress: Progress | None = None,
 ) -> SweepResult:
@@ -61,19 +61,19 @@ def run(
         folder: A new folder, or the folder of the same sweep.
         threads: Number of threads of this process; None for one for each processor.
         cluster: Workers of Dask.distributed instead of threads: "local:2", the address of a scheduler, or a `Client`.
-        share: Part of the chunks, for example "3/16" in the third of 16 jobs.
+        job: Part of the chunks, for example "3/16" in the third of 16 jobs.
         chunk: Number of runs in a file; None for about 2 s of work, by a pilot of 64 runs. Constant for a folder.
         on_progress: Function of the number of finished runs, and of all runs.
 
     Raises:
         SweepError: If an argument is invalid, the folder contains another sweep, or a file cannot be written.
     """
-    instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read(folder).sweep", error=SweepError)
+    instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read_sweep(folder).sweep", error=SweepError)
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
-    path, (job, jobs), work = file_path(folder, SweepError), share_of(share), Work(sweep)
+    path, (number, jobs), work = file_path(folder, SweepError), share_of(job), Work(sweep)
     count = thread_count(threads)
-    if cluster is not None and (share is not None or threads is not None):
-        raise SweepError("cluster: its scheduler distributes the chunks; remove share and threads")
+    if cluster is not None and (job is not None or threads is not None):
+        raise SweepError("cluster: its scheduler distributes the chunks; remove job and threads")
     check_places(path)
     check_folder(path, SweepError)
     _ = sweep.setup, work.record  # raises if a folder names functions that its reader has not named
@@ -89,7 +89,7 @@ def run(
 
     def missing() -> list[int]:
         chunks = store.missing()
-        return chunks[chunks % jobs == job - 1].tolist()
+        return chunks[chunks % jobs == number - 1].tolist()
 
     def make(number: int, look: Callable[[float], object]) -> None:
         if not store.file(number).exists():  # another driver was first
@@ -108,7 +108,7 @@ def run(
     return SweepResult(sweep, store)
 
 
-def read(
+def read_sweep(
     folder: str | Path, scene: str | Path | Callable[..., Any] | None = None, figures: Mapping[str, Any] | None = None
 ) -> SweepResult:
     """Return the result in the folder of a sweep.

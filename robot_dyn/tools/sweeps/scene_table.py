@@ -21,7 +21,7 @@ class SweepTable(Part):
     runs: Annotated[int, Field(gt=0, strict=True)]
     """Number of runs."""
     vary: dict[str, str]
-    """Distributions by the names of `robot-dyn sweepable`, and of `q0` and `v0`."""
+    """Distributions by the names of `robot-dyn parameters`, and of `q0` and `v0`."""
     figures: dict[str, str] = Field(default={})
     """Figures of each run, by name."""
     design: str = "random"

@@ -10,7 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn import RobotDynError, Setup, sweepable
+from robot_dyn import RobotDynError, Setup, parameters
 from robot_dyn.foundations import Answer, Block, QueryError, SweepError, Table, Value, integer, shorten, shown
 from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design, given
@@ -32,7 +32,7 @@ class Sweep(Answer, Value):
     Attributes:
         scene: A scene file, or the import path of a function that returns a `Setup`, such as "my_arm:setup".
         runs: Number of runs, N.
-        vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". Frozen distributions of
+        vary: Distributions by name: a parameter of `rollouts(vary=…)`, "q0" or "v0". Frozen distributions of
             scipy.stats and texts such as "uniform(low=0, high=3)" are allowed, too.
         figures: Figures of each run, by name: `rms_tracking_error()`, `peak("u")`, `final("q", joint)`, or a function
             of a `Run` by import path. Texts such as "peak('u')" are allowed, too.
@@ -82,7 +82,7 @@ class Sweep(Answer, Value):
         if self.stated is not None:
             raise SweepError(
                 f"the folder names the function {self.scene} as its scene, which is called only if you name it:"
-                f" sw.read(folder, scene={self.scene!r}), or --scene {self.scene}"
+                f" sw.read_sweep(folder, scene={self.scene!r}), or --scene {self.scene}"
             )
         if is_scene(self.scene):
             from robot_dyn.scene import read_both  # imported here because functions do not need it
@@ -116,7 +116,7 @@ class Sweep(Answer, Value):
         """Units of the columns that have one, by name."""
         if self.stated is not None:
             return dict(self.stated["units"])
-        by_parameter = {parameter.name: parameter.unit for parameter in sweepable(self.setup).parameters}
+        by_parameter = {parameter.name: parameter.unit for parameter in parameters(self.setup).parameters}
         by_parameter |= {
             f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(self.joint_types)
         }
@@ -170,7 +170,7 @@ class Sweep(Answer, Value):
         try:
             batch_of(self.setup, None, None, values, ())
         except QueryError as error:
-            raise SweepError(f"vary: {str(error).removeprefix('params: ')}") from None
+            raise SweepError(f"vary: {str(error).removeprefix('vary: ')}") from None
 
     @property
     def title(self) -> str:

@@ -20,7 +20,7 @@ from robot_dyn.simulation.results.samples import tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending, Reason
 from robot_dyn.view.plots.figure import LOST, TIME, Axes, Cell, Curve, Style
-from robot_dyn.view.plots.parts import PlotError
+from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -141,7 +141,7 @@ def scatter(view: BatchView) -> list[Panel]:
     """
     runs = view.runs
     varied = [name for name, x in runs.table().items() if name != "run" and _numeric(x) and np.ptp(x) > 0]
-    if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.params, "start "))]):
+    if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.varied, "start "))]):
         raise PlotError("scatter: no parameter and no start differs from run to run; name a column by x=")
     x, at = _column(runs, "x", view.x or varied[0], ())
     y, values = _column(runs, "y", view.y, ("rms tracking error", "largest", "ended"))

@@ -12,19 +12,15 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.plots.figure import DESIRED, NEAR, TIME, Cell, Curve
+from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 from robot_dyn.view.rests import Rest, rests
 
 _CELL_MM, _WIDE_MM = 36.0, 60.0  # the least width of a cell, and of one with a long title
-
-
-class PlotError(RobotDynError):
-    """A run with nothing to draw, or a picture that cannot be written."""
 
 
 @final

@@ -1,10 +1,8 @@
-"""Figures of a run or of a batch: one page with an overview, or the parts that are named, as PNG, SVG or PDF."""
+"""Figures of a run or a batch: an overview on one page, or named parts."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Collection
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -12,8 +10,7 @@ import numpy as np
 from robot_dyn.description.description import check
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.structure import structure_of
-from robot_dyn.foundations import files
-from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
+from robot_dyn.foundations.errors import DescriptionError, QueryError
 from robot_dyn.foundations.errors import shown as text_of
 from robot_dyn.foundations.validate import choice, instance, number, shaped
 from robot_dyn.foundations.values import several
@@ -23,20 +20,15 @@ from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.view.plots.batch import BATCH_PLOTS, BatchView
 from robot_dyn.view.plots.figure import PAPER, THEMES, Style
-from robot_dyn.view.plots.parts import PLOTS, PlotError, View
+from robot_dyn.view.plots.parts import PLOTS, View
+from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import LEAST_MM, MOST_MM, WIDTH_MM, draw
 from robot_dyn.view.series import effort_limits
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from robot_dyn.view.plots.shown import Figure
 
-_LEAST_DPI = 10.0  # below, letters of a figure have no size in pixels
 MOST_JOINTS = 64  # that one figure shows
-PICTURES = (
-    files.FileKind("a plot", ".png", b"\x89PNG"),
-    files.FileKind("a plot", ".svg", b"<?xml"),
-    files.FileKind("a plot", ".pdf", b"%PDF"),
-)
 STYLES = ("screen", "paper")
 
 
@@ -104,36 +96,6 @@ def plot(
         title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
         remarks = [text for text in (end.text, *remark_lines(run.remarks)) if text]
         return draw(panels, title, remarks, look, width, end.ending is Ending.DIVERGED)
-
-
-def save_plot(
-    run: TrajectoryData | RolloutsData, path: str | Path, *names: str, dpi: float = 200, **options: Any
-) -> Path:
-    """Write a figure of a run as PNG, SVG or PDF by the suffix of `path` (.png is added if it has none).
-
-    Another picture of that format under that name is replaced; a file of another kind is not.
-
-    Args:
-        run: As `plot`.
-        path: Where to.
-        *names: As `plot`.
-        dpi: Dots per inch of a PNG, at least 10.
-        **options: As `plot`.
-
-    Raises:
-        PlotError: If it cannot be written; else as `plot`.
-    """
-    dpi = number("dpi", dpi, least=_LEAST_DPI)
-    path = files.target(path, PICTURES, PlotError)
-    picture = io.BytesIO()
-    figure = plot(run, *names, **options)
-    try:
-        figure.savefig(picture, format=path.suffix[1:].lower(), dpi=dpi)
-    except (ValueError, MemoryError, RuntimeError, OverflowError, TypeError) as error:  # of its writers, by dpi
-        raise PlotError(
-            f"{path}: cannot be drawn at {dpi:g} dpi ({shorten(error)}); show less, or choose 150"
-        ) from None
-    return files.save(path, lambda stream: stream.write(picture.getvalue()), PlotError)
 
 
 def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:

@@ -14,7 +14,9 @@ from robot_dyn.foundations.display import drawable
 from robot_dyn.view.plots.figure import TIME, Axes, Style, framed, shortened
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, FigureBase
+    from matplotlib.figure import FigureBase
+
+    from robot_dyn.view.plots.shown import Figure
 
 WIDTH_MM, LEAST_MM, MOST_MM = 180.0, 80.0, 1000.0
 A4_MM, MM = 297.0, 1 / 25.4

@@ -44,7 +44,7 @@ class Judged:
 def judge(seed: int, index: int) -> Judged:
     """Batch number `index` of a seed, run and compared."""
     given = batch(seed, index)
-    runs = rd.rollouts(given.setup, given.q0, given.v0, params=given.params, record=("q", "v"), threads=2)
+    runs = rd.rollouts(given.setup, given.q0, given.v0, vary=given.params, record=("q", "v"), threads=2)
     ratio, differs = 0.0, []
     for i in range(len(runs)):
         own = alone(given, i)

@@ -24,7 +24,7 @@ LINES = (
     "compare pendulum planar_2r --samples 1 --seed 3",
     "simulate scene.toml -o out.npz --csv out.csv --force --json",
     "explain scene.toml",
-    "sweepable scene.toml --json",
+    "parameters scene.toml --json",
     "scene pendulum",
     "plot run.npz -o out.svg --only energy --joint slide --width-mm 120 --dark --force",
     "replay run.npz --html out.html --force --frame pole",
@@ -44,7 +44,7 @@ def seeds(folder: Path) -> list[list[str]]:
 
     scene = folder / "scene.toml"
     scene.write_text(starter("cart_pole").replace("4.0", "0.02", 1), encoding="utf-8")
-    rd.save_run(rd.simulate(rd.read_scene(scene)), folder / "run.npz")
+    rd.simulate(rd.read_scene(scene)).save(folder / "run.npz")
     if os.name == "posix":
         os.mkfifo(folder / "pipe")
     return [line.split() for line in LINES]

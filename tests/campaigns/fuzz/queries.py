@@ -14,8 +14,8 @@ from tests.wrong_arguments import NOT_NUMBERS, NOT_OBJECTS, examples
 
 # These open files, browsers and compilers, or take long by themselves; their arguments are tried one by one elsewhere.
 SLOW = {
-    "compiled", "compare", "euler_lagrange", "list_robots", "load", "load_run", "load_rollouts", "save_rollouts",
-    "plot", "read_scene", "replay", "rollouts", "Adaptive.solve", "save_plot", "save_replay", "save_run",
+    "compiled", "compare", "euler_lagrange", "list_robots", "load", "read",
+    "plot", "read_scene", "replay", "rollouts", "Adaptive.solve", "Rollouts.save", "Trajectory.save",
     "show", "simulate", "linearise",
 }  # fmt: skip
 ENTRIES = (np.nan, np.inf, -np.inf, 1e308, -1e308, 1e160, 5e-324, -0.0, 1e16, -1.0, 0.0, 1j, None, "0.1", True, 10**400)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn import RobotDynError, export
+from robot_dyn import RobotDynError
 from robot_dyn.scene import starter
 from robot_dyn.simulation import robot_of
 from robot_dyn.view import PLOTS, PlotError, document_of
@@ -35,7 +35,7 @@ def seeds(folder: Path) -> list[bytes]:
         path.write_text(starter(name).replace(duration, "0.1", 1), encoding="utf-8")
         runs.append(rd.simulate(rd.read_scene(path)))
     runs.append(replace(runs[0], at_stop=runs[0].q > 0, desired=runs[0].q, tracking_error=runs[0].v))
-    return [rd.save_run(run, folder / f"seed{k}.npz").read_bytes() for k, run in enumerate(runs)]
+    return [run.save(folder / f"seed{k}.npz").read_bytes() for k, run in enumerate(runs)]
 
 
 def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
@@ -57,11 +57,11 @@ def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
 def attempt(mutant: bytes, folder: Path) -> str:
     path = folder / "mutant.npz"
     path.write_bytes(mutant)
-    run = rd.load_run(path)
+    run = rd.read(path)
     assert isinstance(run.summary, str)
     (folder / "mutant.csv").unlink(missing_ok=True)
-    export(run, folder / "mutant.csv")
-    rd.save_run(run, path)
+    run.save(folder / "mutant.csv")
+    run.save(path)
     robot_of(run)
     with suppress(RobotDynError):  # of a run that plots or replays refuse
         view = _view(run, run.joint_names, None, 180.0)

@@ -412,7 +412,7 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
         and fast.plan.reference is PLAN.reference
     )
     assert "the original motion, which fits" in repr(fast)
-    half = fastest(given, share=0.4)
+    half = fastest(given, fraction=0.4)
     assert not half.given and "at 40 % of the peak torques" in repr(half)
 
 
@@ -444,7 +444,9 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
     assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
     assert refusal(["budget", "ur5"]).startswith("ur5: give a motion as well")
     assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
-    assert "--share is for the fastest motion: add --fastest" in refusal(["budget", "ur5", plan, "--share", "0.9"])
+    assert "--fraction is for the fastest motion: add --fastest" in refusal(
+        ["budget", "ur5", plan, "--fraction", "0.9"]
+    )
     assert "--joint must be JOINT=COLUMN" in refusal(["budget", "ur5", plan, "--joint", "J1"])
     assert "--max-payload must be LINK@X,Y,Z" in refusal(["budget", "ur5", plan, "--max-payload", "tool0@1"])
 
@@ -475,7 +477,7 @@ def test_the_command_ends_with_1_if_the_fastest_motion_or_the_given_one_is_too_s
     assert answer["fastest"].keys() == names(promised_keys()["fastest"].partition(": ")[2])
     assert answer["fastest"]["budget"]["fits"] and answer["fastest"]["duration_s"] < answer["duration_s"]
     plan, motors = files / "plan.csv", files / "motors.csv"
-    done = ran("budget", "ur5", plan, "--fastest", "--share", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
+    done = ran("budget", "ur5", plan, "--fastest", "--fraction", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
     assert done.returncode == 0 and "at 90 % of the peak torques" in done.stdout
     assert "the same path at its limits" in (files / "b.svg").read_text(encoding="utf-8")
     heavy = ran("budget", "ur5", plan, "--limits", motors, "--fastest", "--payload", "wrist_3_link=5kg@0.12,0.03,0.05")
@@ -496,7 +498,7 @@ def test_the_command_takes_columns_by_name(files: Path) -> None:
 
 
 def test_the_command_takes_scenes_and_runs_and_writes_figure_and_table(files: Path) -> None:
-    run = rd.save_run(rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05), files / "run")
+    run = rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05).save(files / "run")
     (files / "scene.toml").write_text('robot = "simple_pendulum"\nduration_s = 0.05\n[start]\nq = [0.4]\n')
     for what in (run, files / "scene.toml"):
         assert ran("budget", what).returncode == 0

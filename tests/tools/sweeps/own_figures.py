@@ -10,7 +10,7 @@ from robot_dyn.tools import sweeps as sw
 
 
 def _kp(run: sw.Run) -> float:
-    return float(np.ravel(run.params["kp"])[0])
+    return float(np.ravel(run.varied["kp"])[0])
 
 
 def parity(run: sw.Run) -> float:
@@ -20,7 +20,7 @@ def parity(run: sw.Run) -> float:
 
 def waves(run: sw.Run) -> float:
     """Eight periods of a sine over kp in 0 … 1, which explain 6/7 of the variance, and kd in 0 … 1 the rest."""
-    return sin(16 * pi * _kp(run)) + (float(np.ravel(run.params["kd"])[0]) - 0.5)
+    return sin(16 * pi * _kp(run)) + (float(np.ravel(run.varied["kd"])[0]) - 0.5)
 
 
 def below(run: sw.Run) -> float:

@@ -170,22 +170,22 @@ DESIGN: dict[str, Damage] = {
 def test_a_damaged_specification_or_chunk_is_refused(copy: Path, name: str) -> None:
     (SPECIFICATION | CHUNK)[name](copy)
     with pytest.raises(RobotDynError):
-        sw.read(copy).table()
+        sw.read_sweep(copy).table()
 
 
 @pytest.mark.parametrize("name", BY_HAND)
 @pytest.mark.parametrize("question", [sw.SweepResult.verify, sw.SweepResult.table])
 def test_a_chunk_written_by_hand_is_refused_by_its_file(copy: Path, name: str, question: Callable[..., object]) -> None:
-    question(sw.read(copy))
+    question(sw.read_sweep(copy))
     BY_HAND[name](copy)
     with pytest.raises(SweepError, match=rf"000001\.parquet: .*{AGAIN}"):
-        question(sw.read(copy))
+        question(sw.read_sweep(copy))
 
 
 @pytest.mark.parametrize("name", ["half of the rows", "another chunk", "another sweep"])
 def test_a_damaged_chunk_is_made_again_once_it_is_removed(copy: Path, whole: sw.SweepResult, name: str) -> None:
     CHUNK[name](copy)
-    done = sw.read(copy)
+    done = sw.read_sweep(copy)
     for question in (done.verify, lambda: done.quantiles("end")):
         with pytest.raises(SweepError, match=r"000001\.parquet"):
             question()
@@ -199,7 +199,7 @@ def test_a_damaged_chunk_is_made_again_once_it_is_removed(copy: Path, whole: sw.
 def test_a_folder_of_another_format_is_refused_with_both(copy: Path, found: int) -> None:
     key("format", found)(copy)
     with pytest.raises(SweepError, match=f"has format {found}, but this version reads 5; read it with the version"):
-        sw.read(copy)
+        sw.read_sweep(copy)
 
 
 RESUMED = ("empty", "binary", "a list", "a folder", "runs of text", "chunk 0", "times", "no samples")
@@ -216,7 +216,7 @@ def test_a_damaged_folder_is_not_resumed(copy: Path, whole: sw.SweepResult, name
 def test_damaged_samples_are_refused(copy: Path, name: str) -> None:
     SAMPLES[name](copy)
     with pytest.raises(RobotDynError):
-        sw.read(copy).samples().q.values  # noqa: B018
+        sw.read_sweep(copy).samples().q.values  # noqa: B018
 
 
 @pytest.mark.parametrize("name", DESIGN)
@@ -225,9 +225,9 @@ def test_a_damaged_design_is_refused_until_the_sweep_is_run_again(copy: Path, wh
     rows = design.read_bytes()
     DESIGN[name](copy)
     with pytest.raises(SweepError, match="run the sweep into this folder again"):
-        sw.read(copy)
+        sw.read_sweep(copy)
     sw.run(whole.sweep, copy)
-    assert design.read_bytes() == rows and sw.read(copy).verify() == whole.verify()
+    assert design.read_bytes() == rows and sw.read_sweep(copy).verify() == whole.verify()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes have paths on POSIX alone")
@@ -235,7 +235,7 @@ def test_a_pipe_is_refused_at_once(copy: Path) -> None:
     for name, question in (("samples/q/zarr.json", lambda done: done.samples()), ("sweep.json", None)):
         replaced(name, os.mkfifo)(copy)
         with pytest.raises(RobotDynError), limited(6):
-            done = sw.read(copy)
+            done = sw.read_sweep(copy)
             question and question(done)
 
 
@@ -250,18 +250,18 @@ def test_a_pipe_is_refused_at_once(copy: Path) -> None:
 def test_zeros_without_end_are_refused_at_once(copy: Path, whole: sw.SweepResult, name: str, question: str) -> None:
     """The same question is put to the whole folder first, so that the time is that of reading alone."""
     zeros(name)(copy)
-    first = f"sw.read({str(whole.path)!r}).{question}"
-    assert outcome_of(f"sw.read(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
+    first = f"sw.read_sweep({str(whole.path)!r}).{question}"
+    assert outcome_of(f"sw.read_sweep(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
 
 
 def test_one_flipped_bit_of_a_chunk_is_refused_or_changes_nothing(copy: Path) -> None:
     """Of 60 places in a file of rows; each answer is that of the whole file, or one error."""
-    file, table = copy / ROWS, sw.read(copy).table()
+    file, table = copy / ROWS, sw.read_sweep(copy).table()
     data, others = file.read_bytes(), list[int]()
     for at in np.linspace(4, len(data) - 5, 60).astype(int).tolist():
         file.write_bytes(flipped(data, at))
         try:
-            read = sw.read(copy).table()
+            read = sw.read_sweep(copy).table()
         except RobotDynError:
             continue
         others += [at for name, x in table.items() if not np.array_equal(x, read[name], equal_nan=x.dtype.kind == "f")]
@@ -275,7 +275,7 @@ def test_a_sweep_of_a_table_is_read_in_little_memory(tmp_path: Path) -> None:
     vary = {"kp": sw.uniform(low=10.0, high=20.0)}
     rows = np.random.default_rng(0).random((32, 1))
     sw.run(swept(tmp_path, 32, vary=vary, design=rows), tmp_path / "out", chunk=16)
-    assert outcome_of("sw.read(folder / 'out').table()", tmp_path, gib=8) == "done"
+    assert outcome_of("sw.read_sweep(folder / 'out').table()", tmp_path, gib=8) == "done"
 
 
 OTHER_VERSIONS = """
@@ -294,6 +294,6 @@ def test_results_are_read_after_numpy_and_scipy_were_upgraded(tmp_path: Path) ->
     """A process in which both have other versions makes the folder; here it is read."""
     assert outcome_of(OTHER_VERSIONS, tmp_path, gib=64) == "done"
     assert '"numpy": "0.' in (tmp_path / "old" / "sweep.json").read_text()
-    there, here = sw.read(tmp_path / "old"), sw.run(swept(tmp_path, 40), tmp_path / "new", chunk=20)
+    there, here = sw.read_sweep(tmp_path / "old"), sw.run(swept(tmp_path, 40), tmp_path / "new", chunk=20)
     for name, x in here.table("end", "kd", "q0[0]").items():
         np.testing.assert_array_equal(there.table(name)[name], x)

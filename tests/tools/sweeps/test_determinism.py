@@ -92,9 +92,9 @@ def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
 
 def test_jobs_of_an_array_make_each_chunk_once(tmp_path: Path) -> None:
     sweep = swept(tmp_path, 150)
-    left = [len(sw.run(sweep, tmp_path / "out", chunk=10, share=f"{job}/4").missing) for job in (3, 1, 4)]
+    left = [len(sw.run(sweep, tmp_path / "out", chunk=10, job=f"{job}/4").missing) for job in (3, 1, 4)]
     assert left == [11, 7, 4]  # of 15 chunks these jobs make 4, 4 and 3, and the second makes 4
-    done = sw.run(sweep, tmp_path / "out", share="2/4")
+    done = sw.run(sweep, tmp_path / "out", job="2/4")
     assert done.status["missing"] == 0
     assert done.verify() == digest(sweep)
 

@@ -146,7 +146,7 @@ def test_another_scene_version_or_chunk_is_refused_by_name(begun_100: Path, file
         begun(swept(begun_100.parent, 100), begun_100, chunk=50)
     if file == "scene.toml":
         with pytest.raises(SweepError, match=named):
-            sw.read(begun_100)
+            sw.read_sweep(begun_100)
 
 
 def test_a_folder_of_other_files_is_refused(tmp_path: Path) -> None:
@@ -190,13 +190,13 @@ def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Pa
 
     def pilot_of_the_second(sweep: sw.Sweep, chunk: int | None) -> int:
         monkeypatch.setattr(run_sweep, "pilot", pilot)
-        sw.run(first, out, chunk=20, share="1/3")
+        sw.run(first, out, chunk=20, job="1/3")
         return pilot(sweep, chunk)
 
     monkeypatch.setattr(run_sweep, "pilot", pilot_of_the_second)
     with pytest.raises(SweepError, match="contains another sweep: seed"):
         sw.run(second, out, chunk=20)
-    assert len(sw.read(out).missing) == 2
+    assert len(sw.read_sweep(out).missing) == 2
     done = sw.run(first, out)
     assert done.verify() == digest(first) and set(done.samples().data_vars) == {"q"}
 
@@ -206,12 +206,12 @@ def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
     digest = sw.run(swept(tmp_path / "here", 40), tmp_path / "here" / "out").verify()
     (tmp_path / "here").rename(tmp_path / "there")
     folder, scene = tmp_path / "there" / "out", tmp_path / "there" / "scene.toml"
-    with pytest.raises(SweepError, match=r"no such file.*sw.read\(folder, scene=…\) or --scene"):
-        sw.read(folder)
-    assert sw.read(folder, scene).verify() == digest
+    with pytest.raises(SweepError, match=r"no such file.*sw.read_sweep\(folder, scene=…\) or --scene"):
+        sw.read_sweep(folder)
+    assert sw.read_sweep(folder, scene).verify() == digest
     scene.write_text(scene.read_text().replace("0.9", "0.8"))
     with pytest.raises(SweepError, match="contains another sweep: setup"):
-        sw.read(folder, scene)
+        sw.read_sweep(folder, scene)
 
 
 def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

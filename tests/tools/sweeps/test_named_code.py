@@ -64,15 +64,15 @@ def no_code_ran() -> bool:
 
 
 def test_results_are_read_without_importing_what_the_folder_names(received: Path) -> None:
-    done = sw.read(received)
+    done = sw.read_sweep(received)
     table = done.table()
     answers = done.mean("mine"), done.quantiles("peak"), done.probability("mine > 0.1"), done.sensitivity("mine")
     shown = str(done), done.status, done.units, done.outcomes, done.verify(), done.worst("mine")
-    done.export("rows.csv"), done.save_report("report.html"), done.to_json()
+    done.save("rows.csv"), done.save("report.html"), done.to_json()
     again = pickle.loads(pickle.dumps(done.sweep))
     assert again.units == done.units and again.scene == SCENE
     assert no_code_ran()
-    named = sw.read(received, scene=SCENE, figures={"mine": FIGURE})
+    named = sw.read_sweep(received, scene=SCENE, figures={"mine": FIGURE})
     assert answers == (named.mean("mine"), named.quantiles("peak"), named.probability("mine > 0.1"), answers[3])
     assert (str(named), named.status, named.units, named.outcomes, named.verify(), named.worst("mine")) == shown
     assert named.specification == done.specification
@@ -82,20 +82,20 @@ def test_results_are_read_without_importing_what_the_folder_names(received: Path
 
 
 def test_what_needs_code_that_was_not_named_is_refused(received: Path) -> None:
-    done = sw.read(received)
+    done = sw.read_sweep(received)
     (received / "rows" / "000001.parquet").unlink()
     for ask in (lambda: done.run(3), lambda: done.setup_of(3), lambda: sw.run(done.sweep, received)):
         with pytest.raises(SweepError):
             ask()
     with pytest.raises(SweepError):  # the figure is not named
-        sw.run(sw.read(received, scene=SCENE).sweep, received)
+        sw.run(sw.read_sweep(received, scene=SCENE).sweep, received)
     assert not Path("imported").exists() or "code_of_a_test" in sys.modules  # by the scene, which was named
 
 
 def test_named_code_repeats_and_resumes_runs(received: Path) -> None:
-    kept = sw.read(received).table()
+    kept = sw.read_sweep(received).table()
     (received / "rows" / "000001.parquet").unlink()
-    named = sw.read(received, scene=SCENE, figures={"mine": FIGURE})
+    named = sw.read_sweep(received, scene=SCENE, figures={"mine": FIGURE})
     done = sw.run(named.sweep, received, threads=1)
     for name, x in done.table().items():
         np.testing.assert_array_equal(x, kept[name])
@@ -106,7 +106,7 @@ def test_named_code_repeats_and_resumes_runs(received: Path) -> None:
 def test_a_file_of_another_digest_is_not_imported(received: Path, names) -> None:
     Path("code_of_a_test.py").write_text(CODE + "\n# changed\n")
     with pytest.raises(SweepError):
-        sw.read(received, **names)
+        sw.read_sweep(received, **names)
     assert no_code_ran()
 
 
@@ -127,7 +127,7 @@ def test_a_file_of_another_digest_is_not_imported(received: Path, names) -> None
 )
 def test_other_code_than_that_of_the_folder_is_refused(received: Path, names) -> None:
     with pytest.raises(SweepError):
-        sw.read(received, **names)
+        sw.read_sweep(received, **names)
     assert no_code_ran()
 
 
@@ -149,7 +149,7 @@ def test_a_specification_made_by_hand_calls_nothing(received: Path, monkeypatch:
     data = json.loads((received / "sweep.json").read_text())
     (received / "sweep.json").write_text(json.dumps(data | {"scene": path, "figures": {}}))
     with pytest.raises(SweepError):
-        sw.run(sw.read(received).sweep, received)
+        sw.run(sw.read_sweep(received).sweep, received)
     assert no_code_ran()
 
 
@@ -175,5 +175,5 @@ def test_a_module_that_lies_in_the_folder_is_not_imported(received: Path) -> Non
     data = json.loads((received / "sweep.json").read_text())
     (received / "sweep.json").write_text(json.dumps(data | {"scene": "out.code_of_a_test:setup"}))
     with pytest.raises(SweepError):
-        sw.read(received, scene="out.code_of_a_test:setup")
+        sw.read_sweep(received, scene="out.code_of_a_test:setup")
     assert no_code_ran() and not (received / "imported").exists()

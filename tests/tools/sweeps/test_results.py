@@ -62,7 +62,7 @@ def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
     )
     done = sw.run(plan, tmp_path / "a", chunk=20)
     rows = done.table("mass_scale", "remarks")
-    runs = rd.rollouts(plan.setup, params={"mass_scale": rows["mass_scale"]})
+    runs = rd.rollouts(plan.setup, vary={"mass_scale": rows["mass_scale"]})
     assert rows["remarks"].tolist() == runs.table()["remarks"].tolist()
     assert sw.run(plan, tmp_path / "b", chunk=7).table("remarks")["remarks"].tolist() == rows["remarks"].tolist()
     for text, count in (done.remarks or {}).items():
@@ -114,7 +114,7 @@ def test_a_probability_has_the_interval_of_clopper_and_pearson(done: sw.SweepRes
 
 def test_functions_that_are_given_otherwise_than_by_name_are_refused_with_a_figure(done: sw.SweepResult) -> None:
     with pytest.raises(SweepError, match=r"^figures: give them by name, as \{'settling': "):
-        sw.read(done.path, figures=["late"])  # pyright: ignore[reportArgumentType]
+        sw.read_sweep(done.path, figures=["late"])  # pyright: ignore[reportArgumentType]
 
 
 def test_an_event_that_is_unknown_in_failed_runs_is_refused(done: sw.SweepResult) -> None:
@@ -174,13 +174,13 @@ def test_a_table_of_ones_own_is_a_design(tmp_path: Path) -> None:
     vary = {"kp": sw.uniform(low=10.0, high=20.0), "kd": sw.uniform(low=1.0, high=2.0)}
     done = sw.run(swept(tmp_path, 3, vary=vary, design=rows), tmp_path / "out", chunk=2)
     assert done.table("kp")["kp"].tolist() == pytest.approx([15.0, 11.0, 19.0])
-    assert sw.read(tmp_path / "out").verify() == done.verify()  # the table is in the folder
+    assert sw.read_sweep(tmp_path / "out").verify() == done.verify()  # the table is in the folder
     with pytest.raises(SweepError, match="rows_sha256"):
         sw.run(swept(tmp_path, 3, vary=vary, design=rows + 0.01), tmp_path / "out")
 
 
 def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) -> None:
-    with open(done.export(tmp_path / "rows.csv"), newline="", encoding="utf-8") as file:
+    with open(done.save(tmp_path / "rows.csv"), newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     table = done.table()
     fixed = [f"{column.name} [{column.unit}]" if column.unit else column.name for column in FIXED]
@@ -197,7 +197,7 @@ def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) 
 
 def test_a_parquet_file_says_what_its_columns_are(done: sw.SweepResult, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
-    back, table = parquet.read_table(done.export(tmp_path / "rows.parquet")), done.table()
+    back, table = parquet.read_table(done.save(tmp_path / "rows.parquet")), done.table()
     for heading, x in zip(back.column_names, table.values(), strict=True):
         np.testing.assert_array_equal(back[heading].to_numpy(zero_copy_only=False), x)
     of = {field.name: field.metadata or {} for field in back.schema}
@@ -220,7 +220,7 @@ def test_a_run_repeated_by_its_setup_is_that_of_the_sweep(done: sw.SweepResult) 
 
 
 def test_the_report_has_each_figure_and_the_lines_that_repeat_runs(done: sw.SweepResult, tmp_path: Path) -> None:
-    text = done.save_report(tmp_path / "report.html").read_text(encoding="utf-8")
+    text = done.save(tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<script" not in text and "default-src 'none'" in text
     for name in done.sweep.figures:
         assert f"<h2>{name} [{done.units[name]}]</h2>" in text
@@ -237,7 +237,7 @@ def last(run):
 last.record = ("q",)
 
 def fails_sometimes(run):
-    if run.params["q0"][0] > 0.45:
+    if run.varied["q0"][0] > 0.45:
         raise ValueError("beyond the table")
     return run.t[-1]
 
@@ -272,7 +272,7 @@ def test_a_module_that_changed_is_refused(tmp_path: Path, module: Path) -> None:
     with pytest.raises(SweepError, match=r"figures\.mine\.sha256 is"):
         sw.run(sweep, tmp_path / "out")
     with pytest.raises(SweepError, match="is not the file of the sweep"):
-        sw.read(tmp_path / "out", figures={"mine": "figures_of_a_test:last"})
+        sw.read_sweep(tmp_path / "out", figures={"mine": "figures_of_a_test:last"})
 
 
 def test_a_figure_that_raises_makes_its_run_one_that_raised(tmp_path: Path, module: Path) -> None:

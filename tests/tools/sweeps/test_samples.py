@@ -52,7 +52,7 @@ def test_samples_have_the_same_bits_in_other_chunks_and_are_resumed(tmp_path: Pa
     whole = sw.run(sweep, tmp_path / "a", chunk=128).samples().q.values
     done = sw.run(sweep, tmp_path / "b", chunk=20, threads=2)
     done.folder.file(3).unlink()
-    done = sw.run(sw.read(tmp_path / "b").sweep, tmp_path / "b")
+    done = sw.run(sw.read_sweep(tmp_path / "b").sweep, tmp_path / "b")
     np.testing.assert_array_equal(done.samples().q.values, whole)
 
 
@@ -87,7 +87,7 @@ def test_a_sweep_refused_for_its_samples_leaves_a_folder_that_takes_the_correcte
     with pytest.raises(SweepError, match="times are unknown"):
         sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4e6])}, samples="q"), out, chunk=10)
     sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4.0])}, samples="q"), out, chunk=10)
-    assert np.isfinite(sw.read(out).samples().q.values).all()
+    assert np.isfinite(sw.read_sweep(out).samples().q.values).all()
 
 
 def test_without_the_package_of_samples_no_folder_is_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -166,6 +166,6 @@ def test_the_report_shows_failures_over_the_parameter_that_decides_them(tmp_path
     """Runs fail by the parity of one of 64 values; three other numbers that vary do not matter."""
     vary = {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)}
     done = of_figure(tmp_path, "fails", sw.choice(np.arange(64.0)), design="sobol", vary=vary)
-    page = done.save_report(tmp_path / "report.html").read_text(encoding="utf-8")
+    page = done.save(tmp_path / "report.html").read_text(encoding="utf-8")
     shown = re.search(r"failed runs over (\S+) and (\S+),", page)
     assert shown is not None and "kp" in shown.groups()

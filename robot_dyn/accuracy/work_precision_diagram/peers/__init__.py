@@ -1,7 +1,7 @@
-"""Other programs that can do a motion, where they are installed: SciPy around Pinocchio, MuJoCo, Drake, heyoka.
+"""Other programs that can simulate a motion, if installed: SciPy with Pinocchio, MuJoCo, Drake, heyoka.
 
-They take part under gravity, PD control, friction, soft stops and springs between points, Drake and heyoka in free
-motion. All start from the same file, MuJoCo and Drake by their own parsers.
+SciPy and MuJoCo support gravity, PD control, friction, soft stops and springs between points; Drake and heyoka support
+free motion. All start from the same URDF; MuJoCo and Drake use their own parsers.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.simulation.setup.setup import Setup
 
-# By the module that each needs.
+# By the name of the module that a program needs.
 PEERS: dict[str, Callable[[ArmMotion], list[MethodUnderTest]]] = {
     "scipy": scipy.methods_under_test, "mujoco": mujoco.methods_under_test,
     "pydrake": drake.methods_under_test, "heyoka": heyoka.methods_under_test,
 }  # fmt: skip
-_FREE_ALONE = ("pydrake", "heyoka")
+_FREE_MOTION_ONLY = ("pydrake", "heyoka")
 
 
-def found(setup: Setup) -> tuple[list[MethodUnderTest], list[str]]:
-    """The candidates of other programs for a setup, and which are left out, with the reason."""
+def methods_of_peers(setup: Setup) -> tuple[list[MethodUnderTest], list[str]]:
+    """Return the methods of other programs for a setup, and notes on programs left out, with reasons."""
     installed = [name for name in PEERS if find_spec(name)]
     try:
         motion = ArmMotion(setup)
-    except PeerError as why:
-        return [], [f"other programs ({', '.join(installed)}): {why}"]
+    except PeerError as error:
+        return [], [f"other programs ({', '.join(installed)}): {error}"]
     methods: list[MethodUnderTest] = []
     left_out = [f"{name}: is not installed" for name in PEERS if name not in installed]
     for name in installed:
         try:
-            if name in _FREE_ALONE and not motion.free:
-                raise PeerError("only free motion is given to it")
+            if name in _FREE_MOTION_ONLY and not motion.free:
+                raise PeerError("it is used for free motion only")
             methods += PEERS[name](motion)
         except PeerError as error:
             left_out.append(f"{name}: {error}")

@@ -13,7 +13,7 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
-    """Its default method at growing accuracy."""
+    """Return Drake's default method at increasing accuracy."""
     framework, parsing, tree, analysis, mathematics = (
         import_module(f"pydrake.{name}")
         for name in ("systems.framework", "multibody.parsing", "multibody.plant", "systems.analysis", "math")
@@ -29,25 +29,25 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
         plant.mutable_gravity_field().set_gravity_vector(np.array(robot.edits.gravity))
         plant.Finalize()
     except (RuntimeError, ValueError) as error:
-        raise PeerError(f"it does not take the file: {' '.join(str(error).split())[:200]}") from None
+        raise PeerError(f"it cannot read the file: {' '.join(str(error).split())[:200]}") from None
     if plant.num_positions() != n:
-        raise PeerError(f"it finds {plant.num_positions()} joints in the file, not {n}")
+        raise PeerError(f"it reads {plant.num_positions()} joints from the file, not {n}")
     places = [plant.GetJointByName(name).position_start() for name in robot.joint_names]
     diagram = builder.Build()
-    free = plant.CreateDefaultContext()
+    own_context = plant.CreateDefaultContext()
 
-    def at(context: Any, q: np.ndarray, v: np.ndarray) -> None:
+    def set_state(context: Any, q: np.ndarray, v: np.ndarray) -> None:
         x = np.empty(2 * n)
         x[places], x[n + np.array(places)] = q, v
         plant.SetPositionsAndVelocities(context, x)
 
     def mass_matrix(q: np.ndarray) -> np.ndarray:
-        at(free, q, np.zeros(n))
-        return plant.CalcMassMatrix(free)[np.ix_(places, places)]
+        set_state(own_context, q, np.zeros(n))
+        return plant.CalcMassMatrix(own_context)[np.ix_(places, places)]
 
     def bias(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        at(free, q, v)
-        return (plant.CalcBiasTerm(free) - plant.CalcGravityGeneralizedForces(free))[places]
+        set_state(own_context, q, v)
+        return (plant.CalcBiasTerm(own_context) - plant.CalcGravityGeneralizedForces(own_context))[places]
 
     motion.check(mass_matrix, bias, motion.torque)
 
@@ -57,7 +57,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
         integrator = simulator.get_mutable_integrator()
         integrator.set_target_accuracy(accuracy)
         context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-        at(context, setup.q0, setup.v0)
+        set_state(context, setup.q0, setup.v0)
         simulator.Initialize()
 
         def advance(t: float) -> tuple[np.ndarray, np.ndarray]:

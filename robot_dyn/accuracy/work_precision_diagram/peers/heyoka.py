@@ -1,4 +1,4 @@
-"""heyoka's Taylor method, in compact mode, of the equations that our machine code is of."""
+"""heyoka's Taylor method, in compact mode, for the equations of this library's machine code."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 from robot_dyn.codegen.program import Kind, Program
 from robot_dyn.simulation.compiled.cache import machine_code
 
-_TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
+_TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled separately, which takes many seconds
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
-    """Its Taylor method."""
+    """Return heyoka's Taylor method."""
     hy: Any = import_module("heyoka")
     setup, n = motion.setup, motion.robot.n
     if setup.engine != COMPILED:
-        raise PeerError("its equations are taken from our machine code, which this run has not")
+        raise PeerError("it needs the equations in machine code, which this run does not use")
     machine = machine_code(setup.equation)
     names = [hy.make_vars(f"y{i}") for i in range(2 * n)]
     rates = _in_heyoka(hy, machine.code.programs["rate"], names, machine.parameters)
@@ -48,7 +48,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
 
 
 def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) -> list[Any]:
-    """The outputs y' of a program without branches, of its inputs (t, y, p, own)."""
+    """Return the outputs y' of a program without branches, for its inputs (t, y, p, run parameters)."""
     works = program.inputs[1] - len(y)
     inputs = [hy.expression(0.0), *y, *[hy.expression(0.0)] * works, *[hy.expression(0.0)] * program.inputs[2]]
     inputs += [hy.expression(float(x)) for x in parameters]
@@ -62,11 +62,11 @@ def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) 
         Kind.RECIPROCAL: lambda a: 1.0 / a, Kind.SQUARE_ROOT: hy.sqrt,
     }  # fmt: skip
     for op in program.ops:
-        of = [values[i] for i in op.operands]
+        operands = [values[i] for i in op.operands]
         if op.kind is Kind.SINE_COSINE:
-            values[op.results[0]], values[op.results[1]] = hy.sin(of[0]), hy.cos(of[0])
-        elif (known := two.get(op.kind) if len(of) == 2 else one.get(op.kind)) is not None:
-            values[op.results[0]] = known(*of)
+            values[op.results[0]], values[op.results[1]] = hy.sin(operands[0]), hy.cos(operands[0])
+        elif (function := two.get(op.kind) if len(operands) == 2 else one.get(op.kind)) is not None:
+            values[op.results[0]] = function(*operands)
         else:
-            raise PeerError(f"its equations have a {op.kind.name.lower()}, which is not translated")
+            raise PeerError(f"the operation {op.kind.name.lower()} of the equations is not translated")
     return [values[i] for i in program.outputs[: len(y)]]

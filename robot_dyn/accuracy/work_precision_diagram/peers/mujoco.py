@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+from numpy.typing import ArrayLike
 
 from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, MethodUnderTest, Run, step_ladder
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, bare_urdf, desired_motion
@@ -18,22 +20,25 @@ from robot_dyn.effects.friction import ViscousFriction
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
 
+if TYPE_CHECKING:
+    from mujoco import MjModel  # pyright: ignore[reportAttributeAccessIssue]
+
 STEP_S = 1e-3
-_METHODS = {  # name of the option, order, evaluations of the equation of motion in a step
+_METHODS = {  # name of the option, order, evaluations of the equation of motion per step
     "RK4": ("mjINT_RK4", 4, 4), "Euler": ("mjINT_EULER", 1, 1), "implicitfast": ("mjINT_IMPLICITFAST", 1, 1),
 }  # fmt: skip
 _IN_C = ViscousFriction, LineSpring, LineDamper
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
-    """Its three methods: viscous friction, lines and servos in C, other torques in Python."""
+    """Return MuJoCo's three methods; viscous friction, lines and servos run in C, other torques in Python."""
     module: Any = import_module("mujoco")
     robot, setup, servo, effects = motion.robot, motion.setup, motion.servo, motion.setup.plant.effects
-    damping: Any = sum((each.viscous for each in effects if isinstance(each, ViscousFriction)), start=0.0)
+    damping: Any = sum((effect.viscous for effect in effects if isinstance(effect, ViscousFriction)), start=0.0)
     gains = None if servo is None else (servo.kp, servo.kd)
     model = mujoco_model(module, robot, gains, damping, bare=True, lines=motion.lines)
     at = joint_places(model, robot)
-    others: Any = [each for each in effects if not isinstance(each, _IN_C)]
+    others: Any = [effect for effect in effects if not isinstance(effect, _IN_C)]
     control = None if servo is None else _command(model, servo)
 
     def passive(_: Any, data: Any) -> None:
@@ -42,8 +47,8 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
 
     @contextmanager
     def callbacks() -> Iterator[None]:
-        """What MuJoCo calls at each evaluation, for one run: they are MuJoCo's for all of the process."""
-        module.set_mju_user_warning(lambda _: None)  # it would print, and write a file: the outcome says the same
+        """Install the callbacks of one run; MuJoCo has one set of callbacks per process."""
+        module.set_mju_user_warning(lambda _: None)  # no prints and log files: the outcome reports the warning
         module.set_mjcb_control(control)
         module.set_mjcb_passive(passive if others else None)
         try:
@@ -84,8 +89,8 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
 
             with callbacks(), np.errstate(all="ignore"):
                 q, v, spent = motion.recorded(advance, limit)
-            lost = any(warning.number for warning in data.warning)
-            return motion.run(q * np.nan if lost else q, v, count * records, evaluations * count * records, spent)
+            has_failed = any(warning.number for warning in data.warning)
+            return motion.run(q * np.nan if has_failed else q, v, count * records, evaluations * count * records, spent)
 
         steps = partial(step_ladder, period, order)
         return MethodUnderTest(f"MuJoCo {name}", "", motion.events, order, "step", steps, run)
@@ -94,21 +99,25 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
 
 
 def mujoco_model(
-    mujoco: Any, arm: Robot, gains: tuple[Any, Any] | None = None, damping: Any = 0.0, bare: bool = False,
+    mujoco: ModuleType,
+    arm: Robot,
+    gains: tuple[ArrayLike, ArrayLike] | None = None,
+    damping: ArrayLike = 0.0,
+    bare: bool = False,
     lines: Sequence[LineSpring | LineDamper] = (),
-) -> Any:  # fmt: skip
-    """The arm under RK4 at 1 ms: locked joints fixed, no limits, no contacts; PD with `gains` (kp, kd) on every joint.
+) -> MjModel:
+    """Return the MuJoCo model of an arm, with RK4 at 1 ms; locked joints are fixed, without limits and contacts.
 
     Args:
         mujoco: The module.
         arm: The robot.
-        gains: Of a position servo u = kp (ctrl − q) − kd v on each joint, scalars or (n,).
+        gains: Gains (kp, kd) of a position servo u = kp (ctrl − q) − kd v on every joint, scalars or (n,).
         damping: Viscous friction of each joint, a scalar or (n,), in [N m s/rad].
-        bare: Whether the constraint solver is switched off with all it would look for.
-        lines: Springs and dampers between points: as its tendons.
+        bare: True to switch off the constraint solver with all constraints.
+        lines: Springs and dampers between points, which become tendons.
 
     Raises:
-        PeerError: If it does not take the file, or has other joints or bodies.
+        PeerError: If MuJoCo cannot read the file, or has other joints or bodies.
     """
     urdf = bare_urdf(arm)
     options = etree.SubElement(urdf, "mujoco")
@@ -121,7 +130,7 @@ def mujoco_model(
             _add_servos(mujoco, spec, arm, *gains)
         model = spec.compile()
     except ValueError as error:
-        raise PeerError(f"it does not take the file: {' '.join(str(error).split())}") from None
+        raise PeerError(f"it cannot read the file: {' '.join(str(error).split())}") from None
     model.opt.gravity[:] = arm.edits.gravity
     model.opt.timestep, model.opt.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_RK4
     model.dof_damping[joint_places(model, arm)] = damping
@@ -137,8 +146,12 @@ def mujoco_model(
     return model
 
 
-def joint_places(model: Any, arm: Robot) -> list[int]:
-    """Where a model has the joints of the arm, in the order of the arm's; PeerError if it has others."""
+def joint_places(model: MjModel, arm: Robot) -> list[int]:
+    """Return the indices of the arm's joints in a model, in the order of the arm.
+
+    Raises:
+        PeerError: If the model has other joints.
+    """
     names = [model.joint(i).name for i in range(model.njnt)]
     if set(names) != set(arm.joint_names):
         raise PeerError(f"it has other joints: {', '.join(names)}")
@@ -146,7 +159,7 @@ def joint_places(model: Any, arm: Robot) -> list[int]:
 
 
 def _add_servos(mujoco: Any, spec: Any, arm: Robot, kp: Any, kd: Any) -> None:
-    """One for each joint, in the order of the arm's."""
+    """Add a position servo for every joint, in the order of the arm."""
     for name, kp_i, kd_i in zip(arm.joint_names, *(np.broadcast_to(x, arm.n) for x in (kp, kd)), strict=True):
         servo = spec.add_actuator()
         servo.target, servo.trntype = name, mujoco.mjtTrn.mjTRN_JOINT
@@ -159,13 +172,13 @@ def _add_tendon(spec: Any, line: LineSpring | LineDamper, name: str) -> None:
     for k, (frame, point) in enumerate(((line.frame, line.point), (line.other_frame, line.other_point))):
         body = spec.worldbody if frame is None else spec.body(frame)
         if body is None:
-            raise PeerError(f"it has no body {frame!r}")
+            raise PeerError(f"its model has no body {frame!r}")
         body.add_site(name=f"{name}, end {k}", pos=np.asarray(point))
         tendon.wrap_site(f"{name}, end {k}")
 
 
 def _command(model: Any, servo: PD) -> Callable[[Any, Any], None]:
-    """Makes servos whose command is kp q_d + kd v_d: MuJoCo subtracts kp q + kd v."""
+    """Return the callback that commands kp q_d + kd v_d; MuJoCo subtracts kp q + kd v."""
     desired = desired_motion(servo.reference)
     model.actuator_gainprm[:, 0] = 1.0
 

@@ -14,19 +14,19 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, M
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 
-_LEAST = 3e-14  # rtol; SciPy's own lower bound is 100 eps
-_FREE = {"DOP853": 8}  # with their orders
+_MIN_RTOL = 3e-14  # SciPy's own lower bound is 100 eps
+_FREE = {"DOP853": 8}  # methods with their orders
 _DAMPED = {"DOP853": 8, "Radau": 5, "LSODA": None}  # damped motion may be stiff
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
-    """Methods of `solve_ivp`."""
+    """Return the methods of `solve_ivp`."""
     pin: Any = import_module("pinocchio")
     from scipy.integrate import solve_ivp
 
     robot, setup, n, times = motion.robot, motion.setup, motion.robot.n, motion.times
     if not robot.couplings.trivial:
-        raise PeerError("pin.aba knows no coupled joints")
+        raise PeerError("pin.aba does not support coupled joints")
     model: Any = robot.model
     data, torque, zero = model.createData(), _torque(motion, pin), np.zeros(n)
     start = np.concatenate([setup.q0, setup.v0])
@@ -44,15 +44,15 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
                 q, v = y[:n], y[n:]
                 return np.concatenate([v, pin.aba(model, data, q, v, torque(t, q, v))])
 
-            accuracy: Any = {"rtol": max(rtol, _LEAST), "atol": 1e-2 * rtol}
+            accuracy: Any = {"rtol": max(rtol, _MIN_RTOL), "atol": 1e-2 * rtol}
             q, v, evaluations = *np.full((2, len(times), n), np.nan), None
             began = perf_counter()
-            # warnings are of steps that it then refuses; a ValueError of Radau, whose iteration overflowed
+            # overflow warnings come from steps that it then rejects; ValueError from Radau, if its iteration overflows
             with np.errstate(all="ignore"), suppress(ValueError):
-                found: Any = solve_ivp(rate, (0.0, times[-1]), start, name, t_eval=times, **accuracy)
-                evaluations = found.nfev
-                if found.status == 0:
-                    q, v = found.y[:n].T, found.y[n:].T
+                solution: Any = solve_ivp(rate, (0.0, times[-1]), start, name, t_eval=times, **accuracy)
+                evaluations = solution.nfev
+                if solution.status == 0:
+                    q, v = solution.y[:n].T, solution.y[n:].T
             return motion.run(q, v, None, evaluations, perf_counter() - began)
 
         return MethodUnderTest(f"SciPy {name} + pin.aba", "", motion.events, order, "tolerance", tolerances, run)
@@ -61,12 +61,12 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
 
 
 def _torque(motion: ArmMotion, pin: Any) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
-    """τ(t, q, v): that of the joints, and of lines by Pinocchio's Jacobians of their points."""
+    """Return τ(t, q, v) of the joints, and of lines by Pinocchio's Jacobians of their points."""
     if not motion.lines:
         return motion.torque
     model: Any = motion.robot.model
     data, skew, axes = model.createData(), pin.skew, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    lines = [(each, *_ends(motion, model, each)) for each in motion.lines]
+    lines = [(line, *_ends(motion, model, line)) for line in motion.lines]
 
     def point(frame: int | None, at: np.ndarray) -> tuple[np.ndarray, Any]:
         if frame is None:
@@ -78,12 +78,12 @@ def _torque(motion: ArmMotion, pin: Any) -> Callable[[float, np.ndarray, np.ndar
         total = motion.torque(t, q, v)
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        for each, one, other in lines:
-            (p, J), (p_other, J_other) = point(*one), point(*other)
+        for line, end, other_end in lines:
+            (p, J), (p_other, J_other) = point(*end), point(*other_end)
             length = np.sqrt((p - p_other) @ (p - p_other))
             slope = ((p - p_other) / length) @ (J - J_other)
-            spring = isinstance(each, LineSpring)
-            force = each.stiffness * (length - each.length) if spring else each.damping * (slope @ v)
+            is_spring = isinstance(line, LineSpring)
+            force = line.stiffness * (length - line.length) if is_spring else line.damping * (slope @ v)
             total = total - slope * force
         return total
 
@@ -91,7 +91,7 @@ def _torque(motion: ArmMotion, pin: Any) -> Callable[[float, np.ndarray, np.ndar
 
 
 def _ends(motion: ArmMotion, model: Any, line: LineSpring | LineDamper) -> Iterator[tuple[int | None, np.ndarray]]:
-    """Frame and point of both ends; None for the world, in which the base of the arm rests."""
+    """Return frame and point of both ends; the frame is None for the world, to which the base of the arm is fixed."""
     for frame, at in (line.frame, line.point), (line.other_frame, line.other_point):
         if frame is not None and not model.existFrame(frame):
             raise PeerError(f"Pinocchio has no frame {frame!r}")

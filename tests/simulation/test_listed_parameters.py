@@ -1,4 +1,4 @@
-"""Every parameter that is listed can be swept: with the value that is listed the run is the run of the setup."""
+"""Every parameter that is listed can vary: with the value that is listed the run is the run of the setup."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ def test_each_one_can_be_swept_and_has_the_value_of_the_setup(every: int) -> Non
     """To the rounding of the same equations, in which a number is an input and not a constant."""
     given = setup()
     alone = end(given)
-    known = rd.sweepable(given).parameters
+    known = rd.parameters(given).parameters
     for each in known[::every]:
-        swept = end(given, params={each.name: each.value[None]})
+        swept = end(given, vary={each.name: each.value[None]})
         np.testing.assert_allclose(swept, alone, rtol=0, atol=1e-13, err_msg=each.name)
     assert {"kp", "spring 2.rest", "payload_mass:pole", "pole.mass", "model.mass_scale"} <= {x.name for x in known}
 
 
 def test_units_are_those_of_the_joints() -> None:
     """cart_pole slides and turns."""
-    units = {each.name: each.unit for each in rd.sweepable(setup()).parameters}
+    units = {each.name: each.unit for each in rd.parameters(setup()).parameters}
     assert units["viscous_friction.viscous"] == "N s/m or N m s/rad"
     assert units["position.quantisation.resolution"] == "m or rad"
     assert (units["gravity"], units["mass_scale"], units["pole.inertia"]) == ("m/s²", "", "kg m²")
@@ -53,9 +53,9 @@ def test_units_are_those_of_the_joints() -> None:
 def test_the_value_is_what_the_command_prints(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(starter("cart_pole"), encoding="utf-8")
-    answer = rd.sweepable(rd.read_scene(scene))
-    assert said("sweepable", scene) == f"{answer}\n"
-    assert document("sweepable", scene) == json.loads(answer.to_json())
+    answer = rd.parameters(rd.read_scene(scene))
+    assert said("parameters", scene) == f"{answer}\n"
+    assert document("parameters", scene) == json.loads(answer.to_json())
     text = answer._repr_html_()
     assert "<script" not in text and len(text) < 10_000
     assert len(list(html.fragment_fromstring(text).iter("tr"))) == len(answer.parameters) + 1

@@ -1,4 +1,4 @@
-"""The parameters of a setup that `rollouts` can sweep, with values and units."""
+"""The parameters of a setup that `rollouts` can vary, with values and units."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robot_dyn.codegen.parameters import Parameter, sweepable_parameters, with_parameters
+from robot_dyn.codegen.parameters import Parameter, variable_parameters, with_parameters
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
@@ -23,11 +23,11 @@ from robot_dyn.simulation.setup.setup import Setup
 
 @final
 @dataclass(frozen=True, eq=False)
-class SweptParameter(Value):
+class SetupParameter(Value):
     """A parameter that may differ from run to run.
 
     Attributes:
-        name: Its key in `params` of `rollouts`.
+        name: Its key in `vary` of `rollouts`.
         value: Its value in the setup.
         unit: Unit for a revolute joint, and for a prismatic joint if that differs; empty if it has none.
         shape: Shape of its values over B runs, for example "(B,) or (B, 6)".
@@ -44,27 +44,27 @@ class SweptParameter(Value):
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweepable(Answer):
-    """The parameters of a setup that `rollouts` can sweep.
+class Parameters(Answer):
+    """The parameters of a setup that `rollouts` can vary.
 
     Attributes:
         parameters: Parameters in the order of robot, effects, controller and its models.
     """
 
-    parameters: tuple[SweptParameter, ...]
+    parameters: tuple[SetupParameter, ...]
 
     def blocks(self) -> Iterator[Block]:
-        yield "parameters that rd.rollouts(setup, params={name: values}) can sweep over B runs:"
+        yield "parameters that rd.rollouts(setup, vary={name: values}) can vary over B runs:"
         rows = ((x.name, _shown(x.value), x.unit, x.shape) for x in self.parameters)
         yield Table(("name", "value", "unit", "values"), tuple(rows))
 
 
-def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
-    """Return the parameters that `rollouts` can sweep: names, values, units and shapes.
+def parameters(what: Setup | Plant | Dynamics) -> Parameters:
+    """Return the parameters that `rollouts` can vary: names, values, units and shapes.
 
     They are coefficients of effects, gains of the controller, gravity, payloads, armature, the factor on all masses,
     mass and inertia of each link, and the same for the controller's models. Its `repr` is the table that
-    `robot-dyn sweepable` prints, `to_json()` the document of its `--json`.
+    `robot-dyn parameters` prints, `to_json()` the document of its `--json`.
 
     Args:
         what: A setup, a plant or a robot.
@@ -75,19 +75,19 @@ def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
     setup = what if isinstance(what, Setup) else None
     plant = setup.plant if setup is not None else what if isinstance(what, Plant) else Plant(what)  # pyright: ignore[reportArgumentType]
     controller = None if setup is None else setup.controller
-    parameters = sweepable_parameters(plant.dynamics, plant.effects, controller)
-    by_name = {parameter.name: swept_parameter(parameter, plant.dynamics) for parameter in reversed(parameters)}
-    return Sweepable(tuple(by_name.values())[::-1])
+    parameters = variable_parameters(plant.dynamics, plant.effects, controller)
+    by_name = {parameter.name: setup_parameter(parameter, plant.dynamics) for parameter in reversed(parameters)}
+    return Parameters(tuple(by_name.values())[::-1])
 
 
-def swept_parameter(parameter: Parameter, dynamics: Dynamics | None) -> SweptParameter:
+def setup_parameter(parameter: Parameter, dynamics: Dynamics | None) -> SetupParameter:
     """Return a parameter of `robot_dyn.codegen.parameters` with its unit."""
     types = joint_types_of(dynamics)
     of_joints, value = parameter.declared.of_joints, parameter.value
     signal = SIGNALS.get(parameter.name.partition(".")[0], SIGNAL)
     unit = coefficient_unit(replace(parameter.declared, unit=parameter.declared.unit.replace(SIGNAL, signal)), types)
     shape = f"(B,) or (B, {value.size})" if of_joints else f"(B{''.join(f', {n}' for n in value.shape)})"
-    return SweptParameter(parameter.name, value, unit, shape.replace("(B)", "(B,)"))
+    return SetupParameter(parameter.name, value, unit, shape.replace("(B)", "(B,)"))
 
 
 def _shown(value: np.ndarray) -> str:
