@@ -25,17 +25,17 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 33,
+    "opening": 32,
     "as of": 10,
-    "what without noun": 56,
+    "what without noun": 54,
     "is told": 1,
     "says that": 10,
     "tells that": 1,
     "goes on": 0,
-    "looks": 6,
+    "looks": 3,
     "believes": 0,
-    "is no": 6,
-    "of its own": 9,
+    "is no": 3,
+    "of its own": 4,
     "behind": 1,
     "beside": 9,
     "anew": 0,
@@ -43,12 +43,12 @@ CEILINGS = {
     "in place of": 2,
     "so many": 0,
     "but for": 0,
-    "whatever": 2,
-    "of which": 8,
+    "whatever": 1,
+    "of which": 6,
     "the same holds": 0,
     "each": 53,
     "arguments": 0,
-    "Any": 563,
+    "Any": 552,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
