@@ -125,13 +125,21 @@ CONTROL = SimpleNamespace(
     samples=lambda t, q: _ct.Samples(t, q),
     circle=lambda centre, radius, normal, period: _ct.circle(centre, radius, normal, period),
     line=lambda p0, p1, duration: _ct.line(p0, p1, duration),
-    pd=lambda reference, kp, kd, period=0.0: _ct.PD(reference, kp, kd, period),
-    pid=lambda reference, kp, ki, kd, limit=np.inf, period=0.0: _ct.PID(reference, kp, ki, kd, limit, period_s=period),
-    pd_gravity=lambda model, reference, kp, kd, period=0.0: _ct.PDGravity(model, reference, kp, kd, period),
-    computed_torque=lambda model, reference, kp, kd, period=0.0: _ct.ComputedTorque(model, reference, kp, kd, period),
-    feed_forward=lambda model, reference, kp, kd, period=0.0: _ct.FeedForward(model, reference, kp, kd, period),
+    pd=lambda reference, kp, kd, period=0.0: _ct.PD(reference, kp=kp, kd=kd, period_s=period),
+    pid=lambda reference, kp, ki, kd, limit=np.inf, period=0.0: _ct.PID(
+        reference, kp=kp, ki=ki, kd=kd, effort_limit=limit, period_s=period
+    ),
+    pd_gravity=lambda model, reference, kp, kd, period=0.0: _ct.PDGravity(
+        model, reference, kp=kp, kd=kd, period_s=period
+    ),
+    computed_torque=lambda model, reference, kp, kd, period=0.0: _ct.ComputedTorque(
+        model, reference, kp=kp, kd=kd, period_s=period
+    ),
+    feed_forward=lambda model, reference, kp, kd, period=0.0: _ct.FeedForward(
+        model, reference, kp=kp, kd=kd, period_s=period
+    ),
     operational_space=lambda model, frame, reference, kp, kd, rows=None, period=0.0: _ct.OperationalSpace(
-        model, frame, reference, kp, kd, rows=rows, period_s=period
+        model, frame, reference, kp=kp, kd=kd, rows=rows, period_s=period
     ),
     function=lambda law, n: _ct.ControlLaw(law, n),
     loop=lambda law, position=(), velocity=(), actuation=(), measured=0.0, acts=0.0, seed=0: _ct.Loop(
