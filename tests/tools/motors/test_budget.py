@@ -243,7 +243,7 @@ def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so
 
 
 def followed(plant: rd.Plant, **options: Any) -> rd.Trajectory:
-    law = rd.control.ComputedTorque(plant.dynamics, PLAN.reference, 400.0, 40.0)  # pyright: ignore
+    law = rd.control.ComputedTorque(plant.dynamics, PLAN.reference, kp=400.0, kd=40.0)  # pyright: ignore
     return rd.simulate(
         plant, POINTS[0], **{"duration_s": TIMES[-1], "controller": law, "estimate_error": False} | options
     )
@@ -520,7 +520,7 @@ def test_a_run_that_simulates_its_gears_has_its_own_rotors(tmp_path: Path) -> No
 
     arm = rd.load("planar_2r")
     gears = rd.effects.SeriesElastic([2000.0, 500.0], [1e-4, 5e-5], 100.0, damping=2.0)
-    options = {"duration_s": 0.2, "controller": rd.control.PD(rd.control.hold([0.5, -0.3]), 200.0, 20.0)}
+    options = {"duration_s": 0.2, "controller": rd.control.PD(rd.control.hold([0.5, -0.3]), kp=200.0, kd=20.0)}
     run = rd.simulate(rd.Plant(arm, [gears]), [0.3, -0.5], **options)
     found, bare = rd.tools.motors.budget(run, motors=motors(1e-4)), rd.tools.motors.budget(run, effort=[200.0, 60.0])
     assert [x.peak for x in found.joints] == [x.peak for x in bare.joints]

@@ -153,7 +153,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.2 * arm.effort_limit / arm.velocity_limit)])
     found = rd.tools.motors.path(plant, WAY, fraction=0.95, velocity=0.98 * arm.velocity_limit)
     gains = [4000.0] * 3 + [800.0] * 3, [160.0] * 3 + [16.0] * 3
-    controller = rd.control.FeedForward(arm, found.reference, *gains)
+    controller = rd.control.FeedForward(arm, found.reference, kp=gains[0], kd=gains[1])
     run = rd.simulate(
         plant,
         WAY[0],
@@ -247,8 +247,9 @@ def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
     text = repr(found)
     assert f"{found.duration_s:.6g} s" in text
     assert "shoulder_pan_joint" in text
-    assert found.phases[0].start == pytest.approx(0.0, abs=0.01 * found.duration_s)
-    assert all(first.end <= second.start + 1e-12 for first, second in zip(found.phases, found.phases[1:], strict=False))
+    assert found.phases[0].start_s == pytest.approx(0.0, abs=0.01 * found.duration_s)
+    pairs = zip(found.phases, found.phases[1:], strict=False)
+    assert all(first.end_s <= second.start_s + 1e-12 for first, second in pairs)
     assert "<svg" in found.drawing
     assert '"at_limits"' in found.to_json()
 

@@ -370,7 +370,7 @@ def test_units_of_figures_are_those_of_their_joints_and_of_a_frame() -> None:
     ]  # fmt: skip
     arm = rd.load("ur5")
     path = rd.control.circle([0.4, 0.2, 0.3], 0.05, [0.0, 0.0, 1.0], 2.0)
-    follows = rd.control.OperationalSpace(arm, "tool0", path, 100.0, 20.0)
+    follows = rd.control.OperationalSpace(arm, "tool0", path, kp=100.0, kd=20.0)
     assert (
         sw.rms_tracking_error().unit(rd.Setup(rd.Plant(arm), np.full(6, 0.3), duration_s=0.1, controller=follows))
         == "m"

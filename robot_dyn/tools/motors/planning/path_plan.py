@@ -25,8 +25,8 @@ KINDS = "torque", "velocity", "acceleration"
 class Phase:
     """An interval of time, in [s], in which the limit of one kind and joint binds; both are "" if none does."""
 
-    start: float
-    end: float
+    start_s: float
+    end_s: float
     joint: str
     kind: str
 
