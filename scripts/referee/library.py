@@ -25,7 +25,7 @@ CACHE_VARIABLE = "ROBOT_DYN_CACHE"  # names the folder of compiled code
 METHODS = {
     "Euler": "Euler",
     "semi-implicit Euler": "SemiImplicitEuler",
-    "Midpoint": "Midpoint",
+    "midpoint": "Midpoint",
     "RK4": "RK4",
     "order 8": "DP8",
     "Gauss 2": "GaussLegendre2",
@@ -34,9 +34,12 @@ METHODS = {
     "Rosenbrock, fixed step": "Rodas5PFixed",
     "time stepping": "MoreauJean",
     "DOP853": "DOP853",
-    "Rodas5P": "Rodas5P",
+    "Rosenbrock": "Rodas5P",
     "automatic": "auto",
 }
+_FORMER = "explicit euler,semi implicit euler,midpoint,rk4,order 8,gauss 2,gauss 4,gauss 6,rosenbrock 5,time stepping"
+RENAMED = {**dict(zip(_FORMER.replace(" ", "_").split(","), METHODS.values(), strict=False)), "Rosenbrock": "Rodas5P"}
+"""Names of methods by the names that stored folders have."""
 
 
 def arm(name: str, **edits: Any) -> Any:
