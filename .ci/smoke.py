@@ -18,7 +18,7 @@ assert rd.compare(rd.load("panda")).ok
 
 plant, controller = (
     rd.Plant(arm, [rd.effects.ViscousFriction(0.1)]),
-    rd.control.PD(rd.control.quintic(q, q + 0.5, 0.1), 40.0, 4.0),
+    rd.control.PD(rd.control.quintic(q, q + 0.5, 0.1), kp=40.0, kd=4.0),
 )
 setup = rd.Setup(plant, q, duration_s=0.2, controller=controller, method="RK4")
 runs = [rd.simulate(setup, engine=each) for each in ("interpreted", "compiled")]

@@ -31,13 +31,12 @@ plan = rd.control.quintic(q_start, q_end, move_s)
 inertia = np.diag(model.M((q_start + q_end) / 2))
 kp, kd = rd.control.gains_from(inertia, omega, zeta)  # in [N m/rad], [N m s/rad]
 ki = kp * omega / 4  # [N m/(rad s)]; stable for ki < 2 ζ ω kp
-unit_kp, unit_kd = rd.control.gains_from(1.0, omega, zeta)  # computed torque brings the inertia itself
 
 controllers = {
-    "PD": rd.control.PD(plan, kp, kd),
-    "PID": rd.control.PID(plan, kp, ki, kd),
-    "PD + gravity": rd.control.PDGravity(model, plan, kp, kd),
-    "computed torque": rd.control.ComputedTorque(model, plan, unit_kp, unit_kd),
+    "PD": rd.control.PD(plan, kp=kp, kd=kd),
+    "PID": rd.control.PID(plan, kp=kp, ki=ki, kd=kd),
+    "PD + gravity": rd.control.PDGravity(model, plan, kp=kp, kd=kd),
+    "computed torque": rd.control.ComputedTorque(model, plan, bandwidth_rad_s=omega, damping_ratio=zeta),
 }
 
 rows = []

@@ -27,10 +27,9 @@ q_end = np.array([0.8, -0.2, -0.4, -2.0, 0.3, 2.0, 1.2])
 plan = rd.control.quintic(q_start, q_end, move_s)
 
 kp, kd = rd.control.gains_from(np.diag(model.M((q_start + q_end) / 2)), omega, zeta)
-unit_kp, unit_kd = rd.control.gains_from(1.0, omega, zeta)
 controllers = {
-    "feed-forward": rd.control.FeedForward(model, plan, kp, kd),
-    "computed torque": rd.control.ComputedTorque(model, plan, unit_kp, unit_kd),
+    "feed-forward": rd.control.FeedForward(model, plan, kp=kp, kd=kd),
+    "computed torque": rd.control.ComputedTorque(model, plan, bandwidth_rad_s=omega, damping_ratio=zeta),
 }
 
 rows = []

@@ -29,7 +29,7 @@ def move(arm):
         q0=start,
         v0=np.zeros(2),
         duration_s=5.0,
-        controller=rd.control.PD(rd.control.hold(target), kp, kd),
+        controller=rd.control.PD(rd.control.hold(target), kp=kp, kd=kd),
         method="DP8",
         step_s=0.002,
         record_every_s=0.01,

@@ -2,14 +2,14 @@
 
 An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q)`, …
 Other formulations  Lagrangian, compiled, euler_lagrange
-What it answers     info (an arm), why (a torque by cause), explain (what is integrated), parameters (that can vary)
+Inspection          info (an arm), why (a torque by cause), explain (the equations of a run), parameters (that can vary)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
-To look at          replay, show, plot, diff_runs
+Display             replay, show, plot, diff_runs
 To keep             `.save(path)` of a run, a batch, a page, a figure or a result; read (a run, a batch)
-What comes of it    Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
+Results             Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 
-Rooms, whose docstrings list what is in them: effects (friction, springs, stops, limits, …), control (controllers,
+Subpackages, whose docstrings list their contents: effects (friction, springs, stops, limits, …), control (controllers,
 references, recorded motions, inverse kinematics), integrate (methods), accuracy (work-precision diagrams, certificates,
 costs) and tools (doctor of files, motors, sweeps, proofs, stress tests).
 """

@@ -38,7 +38,7 @@ def motion(name: str) -> rd.Trajectory:
     arm = arm.with_(lock=lock | more) if lock or more else arm
     q0 = np.array(start)
     kp, kd = rd.control.gains_from(1.0, bandwidth_rad_s=15.0)
-    control = rd.control.ComputedTorque(arm.with_(mass_scale=1.2), rd.control.quintic(q0, q0 + way, 1.5), kp, kd)
+    control = rd.control.ComputedTorque(arm.with_(mass_scale=1.2), rd.control.quintic(q0, q0 + way, 1.5), kp=kp, kd=kd)
     return rd.simulate(rd.Plant(arm, "urdf"), q0=q0, duration_s=2.0, controller=control, record_every_s=0.005)
 
 

@@ -127,7 +127,7 @@ class ShortLoop:
         made = law(target, **gains)
         if velocity or any(self.late):
             made = rd.control.Loop(
-                made, velocity=velocity, measurement_delay=self.late[0], actuation_delay=self.late[1]
+                made, velocity=velocity, measurement_delay_periods=self.late[0], actuation_delay_periods=self.late[1]
             )
         q = self.arm.q0
         return rd.Setup(self.arm.plant, q, 0 * q, self.periods * self.period, made, estimate_error=False)

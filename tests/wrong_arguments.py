@@ -148,7 +148,7 @@ def examples(folder: Path) -> dict[str, Example]:
         made[f"{kind}.total_energy"] = dynamics.total_energy, {"q": q, "v": v}
     pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
     points, eye = [q, u, v], np.eye(3)
-    sampled = rd.control.PD(hold, 9.0, 6.0, 0.01)
+    sampled = rd.control.PD(hold, kp=9.0, kd=6.0, period_s=0.01)
     path: Any = rd.control.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     made |= {thing.__name__: (thing, arguments(thing)) for thing in (*EFFECTS.values(), rd.effects.joint_stops)}
     calls = [
@@ -166,8 +166,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.effects.ExternalWrench("pole", np.ones(6)).at, placement=np.eye(4)),
         call(rd.control.FeedForward, **pair),
         call(rd.control.Loop, controller=sampled, position=[rd.control.Quantisation(1e-3)],
-            velocity=[rd.control.Differences()], actuation=[rd.control.RateLimit(9.0)], measurement_delay=1.5,
-            actuation_delay=0.5, seed=3, run=1),
+            velocity=[rd.control.Differences()], actuation=[rd.control.RateLimit(9.0)], measurement_delay_periods=1.5,
+            actuation_delay_periods=0.5, noise_seed=3, run=1),
         call(rd.control.LowPass, cutoff_rad_s=[9.0, 8.0], order=1),
         call(proven.at, t=0.01),
         call(proven.contains, t=0.01, q=q, v=v),
@@ -214,7 +214,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(several.setup_of, run=1),
         call(rd.control.Samples, t=[0.0, 0.5, 1.0], q=points, v=points, a=points),
         call(rd.control.Samples([0.0, 0.5, 1.0], points).at, t=0.1),
-        call(rd.Setup, plant=plant, q0=q, v0=v, duration_s=0.1, controller=rd.control.PD(hold, 1.0, 1.0),
+        call(rd.Setup, plant=plant, q0=q, v0=v, duration_s=0.1, controller=rd.control.PD(hold, kp=1.0, kd=1.0),
             method=rd.integrate.method("RK4"), step_s=1e-3, record_every_s=0.01, estimate_error=True,
             about={"note": "text"}, engine="interpreted"),
         call(rd.effects.Layer, joint=1, width=0.01, level=0.5, of_velocity=True),
@@ -262,12 +262,12 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
-        call(rd.tools.motors.path, plant=robot, points=[q, v], share=0.9, effort=50.0, velocity=4.0,
+        call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),
         call(rd.tools.motors.budget, motion=rd.control.quintic(q, v, 1.0), plant=plant, payload=rd.Payload("pole",
             0.5), motors=None, effort=50.0, velocity=4.0, continuous=u),
         call(rd.tools.motors.max_payload, motor_budget=needs, link="pole", com=[0.1, 0.2, 0.3]),
-        call(rd.tools.motors.fastest, motor_budget=needs, share=0.9),
+        call(rd.tools.motors.fastest, motor_budget=needs, fraction=0.9),
         call(rd.tools.motors.read_motors, path=motors),
         call(rd.tools.motors.point_to_point, arm=robot, q0=q, q1=v, acceleration=1.0, jerk=9.0, velocity=u, v0=0.1,
             v1=0.0, start_s=0.1),
@@ -275,7 +275,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
         call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
         call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
-            record=("q",), cuts=True, numbers=[3, 1], threads=1, most_bytes=10**9),
+            record=("q",), cuts=True, numbers=[3, 1], threads=1, max_bytes=10**9),
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),

@@ -14,6 +14,6 @@ spoke = np.array([0.1, 0.0, 0.0])  # m, from the centre to the start
 up = [0.0, 0.0, 1.0]
 circle = rd.control.circle(pose[:3, 3] - spoke, 0.1, up, 2.0, toward=spoke, rotation=pose[:3, :3])
 kp, kd = rd.control.gains_from(1.0, 20.0)
-law = rd.control.OperationalSpace(arm, "tool0", circle, kp, kd)
-run = rd.simulate(arm, start, duration_s=circle.position.end, controller=law, record_every_s=0.01)
+law = rd.control.OperationalSpace(arm, "tool0", circle, kp=kp, kd=kd)
+run = rd.simulate(arm, start, duration_s=circle.position.end_s, controller=law, record_every_s=0.01)
 page = rd.replay(run, frame="tool0", meshes="coarse")

@@ -10,8 +10,7 @@ import robot_dyn as rd
 arm = rd.load("ur5")
 start = np.array([0.0, -1.2, 1.4, -1.8, -1.57, 0.0])  # rad
 plan = rd.control.quintic(start, start + np.array([0.9, 0.3, -0.4, 0.1, 0.0, 0.0]), duration_s=2.0)
-kp, kd = rd.control.gains_from(1.0, bandwidth_rad_s=15.0)
 load = rd.effects.CarriedPayload(rd.Payload("tool0", 3.0), start_s=0.5, end_s=1.6)
-law = rd.control.ComputedTorque(arm, plan, kp, kd)
+law = rd.control.ComputedTorque(arm, plan, bandwidth_rad_s=15.0)
 run = rd.simulate(rd.Plant(arm, [load]), start, duration_s=2.5, controller=law, record_every_s=0.01)
 page = rd.replay(run, frame="tool0", meshes="coarse")

@@ -12,7 +12,7 @@ a, b, c = (
     [1.2, -0.4, 0.0, 0.9, 0.0, 1.0, 0.6],
 )
 plant = rd.Plant(arm, [rd.effects.ViscousFriction(1.0)])
-path = rd.tools.motors.path(plant, [a, b, c], share=0.95)
+path = rd.tools.motors.path(plant, [a, b, c], fraction=0.95)
 law = rd.control.FeedForward(arm, path.reference, kp=500.0, kd=[50.0] * 4 + [2.0] * 3)
 run = rd.simulate(plant, a, duration_s=path.duration_s, controller=law, record_every_s=0.005)
 page = rd.replay(run, meshes="coarse")

@@ -12,8 +12,8 @@ loop = control.Loop(
     control.PDGravity(arm, goal, kp=[400.0, 200.0], kd=[40.0, 15.0], period_s=1e-3),
     position=[control.Quantisation(1e-4)],
     velocity=[control.Differences(), control.LowPass(500.0, order=1)],
-    measurement_delay=1.0,
-    actuation_delay=0.5,
+    measurement_delay_periods=1.0,
+    actuation_delay_periods=0.5,
 )
 run = rd.simulate(arm, [0.2, -0.4], duration_s=1.0, controller=loop, record_every_s=0.005)
 page = rd.replay(run, frame="tip")

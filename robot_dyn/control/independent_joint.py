@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, final
 
 import numpy as np
@@ -36,6 +36,7 @@ class PD(Stateless):
     """
 
     reference: PiecewisePolynomial
+    _: KW_ONLY
     kp: Any = field(metadata=STIFFNESS)
     kd: Any = field(metadata=DAMPING)
     period_s: float = 0.0
@@ -79,6 +80,7 @@ class PID(Controller):
     term = "sat(kp e + kd ė + z),  ż = ki e + (sat(u) − u)/T_t"
 
     reference: PiecewisePolynomial
+    _: KW_ONLY
     kp: Any = field(metadata=STIFFNESS)
     ki: Any = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
     kd: Any = field(metadata=DAMPING)
@@ -153,14 +155,12 @@ def gains_from(inertia_diagonal: Any, bandwidth_rad_s: Any, damping_ratio: Any =
 
     Source: Siciliano et al. 2009, sec. 8.3.1.
     """
-    arguments = {
-        "inertia_diagonal": inertia_diagonal, "bandwidth_rad_s": bandwidth_rad_s, "damping_ratio": damping_ratio,
-    }  # fmt: skip
-    inertia, omega, zeta = (numbers(name, x, (), ("n",), least=0) for name, x in arguments.items())
+    shapes = (), ("n",)
+    inertia = numbers("inertia_diagonal", inertia_diagonal, *shapes, above=0)
+    omega = numbers("bandwidth_rad_s", bandwidth_rad_s, *shapes, above=0)
+    zeta = numbers("damping_ratio", damping_ratio, *shapes, least=0)
     if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
         raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
-    if not ((inertia > 0).all() and (omega > 0).all()):
-        raise ControlError(f"inertia_diagonal and bandwidth_rad_s must be positive, got {inertia} and {omega}")
     with np.errstate(over="ignore"):
         kp, kd = inertia * omega**2, 2 * zeta * omega * inertia
     return numbers("kp = M_ii ω²", kp, (), ("n",)), numbers("kd = 2 ζ ω M_ii", kd, (), ("n",))

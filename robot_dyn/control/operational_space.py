@@ -7,7 +7,7 @@ Automation 3(1), A unified approach for motion and force control of robot manipu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from math import nan
 from operator import index
 from typing import Any, final
@@ -154,6 +154,7 @@ class OperationalSpace(Stateless):
     model: Dynamics
     frame: str
     reference: CartesianReference
+    _: KW_ONLY
     kp: Any = field(metadata=coefficient("1/s²", shapes=((), ("m",)), least=0))
     kd: Any = field(metadata=coefficient("1/s", shapes=((), ("m",)), least=0))
     posture: Any = field(default=None, metadata=coefficient("rad", shapes=(("n",),)))

@@ -1,4 +1,4 @@
-"""How links and joints connect: one tree with one root; every chain of mimic joints ends at a moving joint."""
+"""Connections of links and joints: one tree with one root; every chain of mimic joints ends at a moving joint."""
 
 from __future__ import annotations
 

@@ -48,8 +48,8 @@ class _JointStops(Effect):
             object.__setattr__(self, name, stop)
         lower, upper = self.lower, self.upper
         if np.ndim(lower) == np.ndim(upper) == 1 and len(lower) != len(upper):
-            raise EffectError(f"lower and upper stops must be of the same joints, got {lower} and {upper}")
-        require("lower stops must lie below upper ones", np.less, lower, upper)
+            raise EffectError(f"lower must have as many values as upper, got {lower} and {upper}")
+        require("lower must be less than upper", np.less, lower, upper)
 
     @property
     def widths(self) -> tuple[Any, Any]:

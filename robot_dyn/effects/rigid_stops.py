@@ -48,7 +48,7 @@ class RigidStops(SetValued):
     def __post_init__(self) -> None:
         super().__post_init__()
         require("restitution must not be greater than 1", lambda e: e <= 1, self.restitution)
-        require("lower stops must lie below upper ones", np.less, self.lower, self.upper)
+        require("lower must be less than upper", np.less, self.lower, self.upper)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return 0 * v

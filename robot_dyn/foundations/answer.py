@@ -124,7 +124,7 @@ class Answer:
 
     @property
     def title(self) -> str:
-        """Its heading in a notebook; the first line unless given."""
+        """Heading in a notebook; if empty, the first line is used."""
         return ""
 
     @property
@@ -143,7 +143,7 @@ class Answer:
         return json_text(self)
 
     def __repr__(self) -> str:
-        return "\n".join(line for each in self.blocks() for line in _lines(each))
+        return "\n".join(line for block in self.blocks() for line in _lines(block))
 
     def _repr_html_(self) -> str:
         from robot_dyn.foundations import display
@@ -154,14 +154,16 @@ class Answer:
 
 
 def html_of(blocks: Iterable[Block]) -> Iterator[str]:
-    """Texts and tables as parts of a page."""
+    """Return texts and tables as parts of a page."""
     from robot_dyn.foundations import display
 
-    for of_text, some in groupby(blocks, lambda each: isinstance(each, str)):
-        if of_text:
-            yield display.text("\n".join(line for each in some for line in _lines(each)).strip("\n"))
+    for is_text, group in groupby(blocks, lambda block: isinstance(block, str)):
+        if is_text:
+            yield display.text("\n".join(line for block in group for line in _lines(block)).strip("\n"))
         else:
-            yield from (display.grid(each.heading, each.cells, each.words) for each in some if isinstance(each, Table))
+            yield from (
+                display.grid(table.heading, table.cells, table.words) for table in group if isinstance(table, Table)
+            )
 
 
 def table(heading: Iterable[str], rows: Iterable[Iterable[str | float]], right: Iterable[str] = ()) -> str:

@@ -9,7 +9,7 @@ Facts = Mapping[str, float | str]
 """Numbers and names by name: the fields of a sentence."""
 
 Part = str | tuple[str, ...]
-"""A format string; or several of them, of which the first whose facts are all known is used."""
+"""A format string; or several, from which the first with all its facts known is used."""
 
 Parts = tuple[Part, ...]
 """The parts of a sentence."""
@@ -22,7 +22,7 @@ def sentence(parts: Parts, facts: Facts) -> str:
 
 
 def prefixed(prefix: str, part: Part) -> Part:
-    """Return a part of which each format string begins with a prefix."""
+    """Return a part with a prefix before each of its format strings."""
     return tuple(prefix + text for text in _texts(part))
 
 

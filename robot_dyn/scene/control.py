@@ -21,7 +21,7 @@ from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare
-from robot_dyn.scene.messages import part
+from robot_dyn.scene.messages import named_by_key, part
 from robot_dyn.scene.references import Reference
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint, wrong_key
 
@@ -139,8 +139,9 @@ class Control(Part):
             return controller
         lines: Any = {line: [block.call(robot) for block in getattr(self, line)] for line in LINES}
         return Loop(
-            controller, **lines, seed=self.noise_seed,
-            measurement_delay=self.measurement_delay_periods, actuation_delay=self.actuation_delay_periods,
+            controller, **lines, noise_seed=self.noise_seed,
+            measurement_delay_periods=self.measurement_delay_periods,
+            actuation_delay_periods=self.actuation_delay_periods,
         )  # fmt: skip
 
     def _controller(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
@@ -151,16 +152,19 @@ class Control(Part):
         kp, kd = self._gains(model, q0)
         if self.kind == "operational_space":
             return OperationalSpace(
-                model, str(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
-                period_s=self.period_s,
+                model, str(self.frame), desired, kp=kp, kd=kd, period_s=self.period_s,
+                posture=q0, posture_kp=kp.max() / 10, posture_kd=2 * np.sqrt(kp.max() / 10),
             )  # fmt: skip
         if self.kind == "pid":
             limit = per_joint("effort_limit_N_m", self.effort_limit_N_m, robot, elsewhere=np.inf)
             limit = stated_efforts(robot) if limit is URDF else limit
-            return PID(desired, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
+            with named_by_key({"effort_limit": "effort_limit_N_m"}):
+                return PID(
+                    desired, kp=kp, ki=kp * self.integral_rate_per_s, kd=kd, effort_limit=limit, period_s=self.period_s
+                )
         if self.kind == "pd":
-            return PD(desired, kp, kd, self.period_s)
-        return KINDS[self.kind](model, desired, kp, kd, self.period_s)  # pyright: ignore[reportCallIssue]
+            return PD(desired, kp=kp, kd=kd, period_s=self.period_s)
+        return KINDS[self.kind](model, desired, kp=kp, kd=kd, period_s=self.period_s)  # pyright: ignore[reportCallIssue]
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Return stiffness and damping, as stated or from ω and ζ."""

@@ -15,6 +15,7 @@ from robot_dyn.foundations.coefficients import URDF, Coefficient, declared
 from robot_dyn.foundations.errors import SceneError
 from robot_dyn.foundations.validate import number, numbers
 from robot_dyn.model.robot import Robot
+from robot_dyn.scene.messages import named_by_key
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Stated, Vector3, per_joint
 
 _SEVERAL = Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD
@@ -38,7 +39,13 @@ class Declared(Part):
         values = [(name, getattr(self, field), form) for field, (name, form) in self.keys.items()]
         values += [(name, value, _UNDECLARED) for name, value in (self.model_extra or {}).items()]
         arguments = [(name, value, form) for name, value, form in values if value is not None or form is None]
-        return type(self).factory(**{name: _argument(name, value, robot, form) for name, value, form in arguments})
+        with named_by_key(self.key_by_name()):
+            return type(self).factory(**{name: _argument(name, value, robot, form) for name, value, form in arguments})
+
+    @classmethod
+    def key_by_name(cls) -> dict[str, str]:
+        """Return the key of each argument of the factory, by the name of the argument."""
+        return {name: cls.model_fields[field].alias or field for field, (name, _) in cls.keys.items()}
 
 
 _UNDECLARED = Coefficient(shapes=((), ("k",), ("k", "m")))

@@ -20,6 +20,7 @@ from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
+from robot_dyn.scene.messages import named_by_key
 from robot_dyn.scene.schema import (
     Form,
     NotNegative,
@@ -28,6 +29,7 @@ from robot_dyn.scene.schema import (
     PerJoint,
     Positive,
     Stated,
+    Truth,
     Vector3,
     kinds_of,
     one_of,
@@ -67,7 +69,11 @@ class DeclaredEffect(Declared, Acting):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         effect = self.call(robot)
-        return effect if isinstance(effect, tuple) else effect.parts
+        effects = effect if isinstance(effect, tuple) else effect.parts
+        with named_by_key(self.key_by_name()):
+            for one in effects:
+                one.on(robot)  # reports wrong values here, where the keys of the file are known
+        return effects
 
 
 class Body(Part):
@@ -86,7 +92,8 @@ class Body(Part):
     @property
     def payload(self) -> Payload:
         """The body and its link."""
-        return Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
+        with named_by_key({"payload inertia": "inertia_kg_m2"}):
+            return Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
 
 
 class Gravity(Edit):
@@ -142,8 +149,9 @@ class Armature(Edit):
             if not stated:
                 return robot.with_(armature=URDF)
             return robot.with_(armature={name: stated.get(name, 0.0) for name in robot.joint_names})
-        inertia = per_joint("armature", self.inertia_kg_m2, robot)
-        return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
+        with named_by_key({"armature": "inertia_kg_m2"}):
+            inertia = per_joint("armature", self.inertia_kg_m2, robot)
+            return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
 
 
 class Carried(Acting, Body):
@@ -154,12 +162,12 @@ class Carried(Acting, Body):
     """Time at which it is picked up; 0 if the arm starts with it."""
     end_s: Positive | None = None
     """Time at which it is dropped."""
-    picked_up: Literal["at_rest", "at_speed_of_link"] = "at_rest"
-    """Motion of the body before it is picked up: at rest, an impact that loses energy, or at the speed of the link."""
+    at_rest: Truth = True
+    """True if the body rests before it is picked up, an impact that loses energy; false if it moves with the link."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         end = inf if self.end_s is None else self.end_s
-        return (CarriedPayload(self.payload, self.start_s, end, self.picked_up == "at_rest"),)
+        return (CarriedPayload(self.payload, self.start_s, end, self.at_rest),)
 
 
 class Wrench(Acting):

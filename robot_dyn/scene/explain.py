@@ -161,7 +161,7 @@ def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
 
 def _ideal(control: Control) -> list[str]:
     """Return the features of a digital loop that this control does not have."""
-    delays = [key.removesuffix("_periods") for key in _DELAYS if not getattr(control, key)]
+    delays = [key for key in _DELAYS if not getattr(control, key)]
     named = {block.kind for _, block in control.blocks}
     kinds = dict.fromkeys(kind for parts in BLOCKS.values() for part in parts for kind in kinds_of(part))
     return [*delays, *(kind for kind in kinds if kind not in named)]

@@ -31,6 +31,39 @@ def part(*path: str | int) -> Iterator[None]:
 
 
 @contextmanager
+def named_by_key(keys: Mapping[str, str]) -> Iterator[None]:
+    """Name the keys of the file in errors, such as "half_gap_rad", instead of the arguments, such as "half_gap".
+
+    Args:
+        keys: Keys by the name of the argument in messages.
+
+    Raises:
+        SceneError: Instead of an error whose message names an argument.
+    """
+    try:
+        yield
+    except RobotDynError as error:
+        renamed = {name: key for name, key in keys.items() if name != key}
+        if not renamed:
+            raise
+        names = "|".join(map(re.escape, sorted(renamed, key=len, reverse=True)))
+        before, after = "than |without |as ", "= | must| of '| names no| has no| has values| is 0|:"
+        message = re.sub(
+            rf"(?<![\w.])({names})='(\w+)'", lambda match: f'{renamed[match[1]]} = "{match[2]}"', str(error)
+        )
+        for pattern in (
+            *(rf"(?<={word})({names})\b" for word in before.split("|")),
+            rf"(?<![\w.])({names})(?={after})",
+        ):
+            message = re.sub(pattern, lambda match: renamed[match[1]], message)
+        if message == str(error):
+            raise
+        named = SceneError(message)
+        vars(named).update(vars(error))
+        raise named from None
+
+
+@contextmanager
 def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str]) -> Iterator[None]:
     """Note in errors the path of the first part that their message names, and put its place before the message.
 

@@ -56,7 +56,7 @@ class Quintic(Reference):
 
 
 class ViaPoints(Reference):
-    """A spline from the start, at rest, through at most 2000 points; at rest at the end unless v_end is given.
+    """A spline from the start, at rest, through at most 2000 points; at rest at the end unless v1 is given.
 
     The points are given by times_s and points, or by a file.
     """
@@ -72,14 +72,14 @@ class ViaPoints(Reference):
     """Headings of columns by joint, if they are not the names of the joints."""
     unit: Literal["rad", "deg"] | None = None
     """Unit of angles whose heading states none."""
-    v_end: PerJoint = 0.0
+    v1: PerJoint = 0.0
     """Velocity at the last point."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         times, points = self._times_and_points(robot)
         if len(times) != len(points):
             raise SceneError(f"reference: {len(times)} times_s for {len(points)} points; give one time for each point")
-        v1 = per_joint("v_end", self.v_end, robot)
+        v1 = per_joint("v1", self.v1, robot)
         if len(times) and times[0] == 0:
             return via_points(times, points, v1=v1)
         return via_points([0.0, *times], [q0.tolist(), *points], v1=v1)

@@ -160,7 +160,8 @@ class Scene(Part):
                         acting += built
                         paths |= {one.name: ("effect", k) for one in built if one.name not in paths}
                 except RobotDynError as error:
-                    raise SceneError(f"effect {k + 1} ({effect.kind}): {error}") from None
+                    message = str(error).removeprefix(f"{effect.kind}: ")
+                    raise SceneError(f"effect {k + 1} ({effect.kind}): {message}") from None
         with part("start"):
             q0, v0 = (per_joint(f"start.{key}", getattr(self.start, key), robot) for key in ("q", "v"))
         reference = self.reference

@@ -1,4 +1,4 @@
-"""Tools: products of their own, which use the library as a user would.
+"""Tools: separate products, which use the library as a user would.
 
     doctor   faults of a URDF file, and repairs
     motors   plans, and whether the motors suffice for them

@@ -19,7 +19,7 @@ def scenes() -> dict[str, rd.Setup]:
     """Five smooth scenes, for RK4."""
     panda, double, rk4 = arms()["Panda-7"], rd.load("planar_2r"), rd.integrate.method("RK4")
     reach = rd.control.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
-    control = rd.control.ComputedTorque(panda, reach, *rd.control.gains_from(1.0, 8.0, 0.9))
+    control = rd.control.ComputedTorque(panda, reach, bandwidth_rad_s=8.0, damping_ratio=0.9)
     friction, spring = rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([30.0, 0.0], [0.2, 0.0])
     return {
         "pendulum": rd.Setup(rd.Plant(rd.load("pendulum")), [2.5], [0.7], duration_s=2.0, method=rk4, step_s=4e-3),

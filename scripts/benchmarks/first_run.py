@@ -25,7 +25,7 @@ print(time.process_time() - began)
 _SCENES = {
     "RK4, PD and viscous friction": (
         "rd.Plant(arm, [rd.effects.ViscousFriction(0.5)])",
-        "controller=rd.control.PD(rd.control.hold(q), 80.0, 8.0), method='RK4'",
+        "controller=rd.control.PD(rd.control.hold(q), kp=80.0, kd=8.0), method='RK4'",
     ),
     "DOP853, joint stops": (
         "rd.Plant(arm, rd.effects.joint_stops([x - 0.3 for x in q], [x + 0.3 for x in q], 1e4, 10.0))",

@@ -24,8 +24,8 @@ def parameters(effort: Effort) -> None:
     scenes = {
         "free swing": (arm, [], None),
         "free swing, payload": (held, [], None),
-        "PD, friction": (arm, friction, rd.control.PD(goal, 100.0, 10.0)),
-        "computed torque, friction": (arm, friction, rd.control.ComputedTorque(arm, goal, 100.0, 20.0)),
+        "PD, friction": (arm, friction, rd.control.PD(goal, kp=100.0, kd=10.0)),
+        "computed torque, friction": (arm, friction, rd.control.ComputedTorque(arm, goal, kp=100.0, kd=20.0)),
     }
     table("what", "constants", "inputs", "ratio", "one run", "many runs", "other values, ms")
     for name, (robot, effects, controller) in list(scenes.items())[: 1 if effort.quick else None]:

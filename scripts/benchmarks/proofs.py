@@ -120,16 +120,19 @@ def acting(effort: Effort) -> None:
             "planar_2r",
             1.0,
             "PD, kp = 100, kd = 10",
-            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), 100.0, 10.0),
+            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), kp=100.0, kd=10.0),
         ),
         Case(
-            "ur5", 0.1, "PD, kp = 100, kd = 1", control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), 100.0, 1.0)
+            "ur5",
+            0.1,
+            "PD, kp = 100, kd = 1",
+            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), kp=100.0, kd=1.0),
         ),
         Case(
             "ur5",
             0.1,
             "PD, kp = 100, kd = 10",
-            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), 100.0, 10.0),
+            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), kp=100.0, kd=10.0),
         ),
         Case("ur5", 0.1, "computed torque, masses 10 % off", control=_computed_torque),
         Case("pendulum", 1.0, "tanh, f = 1, v_s = 0.01", (tanh(1.0),)),
@@ -145,7 +148,9 @@ def acting(effort: Effort) -> None:
 
 
 def _computed_torque(robot: rd.Robot, q: np.ndarray) -> rd.control.ComputedTorque:
-    return rd.control.ComputedTorque(robot.with_(mass_scale=0.9), rd.control.quintic(q, q + 0.5, 0.5), 100.0, 20.0)
+    return rd.control.ComputedTorque(
+        robot.with_(mass_scale=0.9), rd.control.quintic(q, q + 0.5, 0.5), kp=100.0, kd=20.0
+    )
 
 
 def _row(case: Case, bits: int) -> None:

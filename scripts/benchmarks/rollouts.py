@@ -73,7 +73,7 @@ def sticking(effort: Effort) -> None:
 def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what: str) -> None:
     panda, runs, steps = arms()["Panda-7"], (128 if effort.quick else BATCH), (40 if effort.quick else 1000)
     goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).uniform(-1, 1, size=(runs, 7))
-    control = rd.control.PD(rd.control.hold(goal), *GAINS)
+    control = rd.control.PD(rd.control.hold(goal), kp=GAINS[0], kd=GAINS[1])
     plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), *held])
     setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, method=method)
     first = np.zeros((runs, 1 + 14))

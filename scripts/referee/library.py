@@ -25,7 +25,7 @@ CACHE_VARIABLE = "ROBOT_DYN_CACHE"  # names the folder of compiled code
 METHODS = {
     "Euler": "Euler",
     "semi-implicit Euler": "SemiImplicitEuler",
-    "Midpoint": "Midpoint",
+    "midpoint": "Midpoint",
     "RK4": "RK4",
     "order 8": "DP8",
     "Gauss 2": "GaussLegendre2",
@@ -34,9 +34,12 @@ METHODS = {
     "Rosenbrock, fixed step": "Rodas5PFixed",
     "time stepping": "MoreauJean",
     "DOP853": "DOP853",
-    "Rodas5P": "Rodas5P",
+    "Rosenbrock": "Rodas5P",
     "automatic": "auto",
 }
+_FORMER = "explicit euler,semi implicit euler,midpoint,rk4,order 8,gauss 2,gauss 4,gauss 6,rosenbrock 5,time stepping"
+RENAMED = {**dict(zip(_FORMER.replace(" ", "_").split(","), METHODS.values(), strict=False)), "Rosenbrock": "Rodas5P"}
+"""Names of methods by the names that stored folders have."""
 
 
 def arm(name: str, **edits: Any) -> Any:
@@ -122,13 +125,21 @@ CONTROL = SimpleNamespace(
     samples=lambda t, q: _ct.Samples(t, q),
     circle=lambda centre, radius, normal, period: _ct.circle(centre, radius, normal, period),
     line=lambda p0, p1, duration: _ct.line(p0, p1, duration),
-    pd=lambda reference, kp, kd, period=0.0: _ct.PD(reference, kp, kd, period),
-    pid=lambda reference, kp, ki, kd, limit=np.inf, period=0.0: _ct.PID(reference, kp, ki, kd, limit, period_s=period),
-    pd_gravity=lambda model, reference, kp, kd, period=0.0: _ct.PDGravity(model, reference, kp, kd, period),
-    computed_torque=lambda model, reference, kp, kd, period=0.0: _ct.ComputedTorque(model, reference, kp, kd, period),
-    feed_forward=lambda model, reference, kp, kd, period=0.0: _ct.FeedForward(model, reference, kp, kd, period),
+    pd=lambda reference, kp, kd, period=0.0: _ct.PD(reference, kp=kp, kd=kd, period_s=period),
+    pid=lambda reference, kp, ki, kd, limit=np.inf, period=0.0: _ct.PID(
+        reference, kp=kp, ki=ki, kd=kd, effort_limit=limit, period_s=period
+    ),
+    pd_gravity=lambda model, reference, kp, kd, period=0.0: _ct.PDGravity(
+        model, reference, kp=kp, kd=kd, period_s=period
+    ),
+    computed_torque=lambda model, reference, kp, kd, period=0.0: _ct.ComputedTorque(
+        model, reference, kp=kp, kd=kd, period_s=period
+    ),
+    feed_forward=lambda model, reference, kp, kd, period=0.0: _ct.FeedForward(
+        model, reference, kp=kp, kd=kd, period_s=period
+    ),
     operational_space=lambda model, frame, reference, kp, kd, rows=None, period=0.0: _ct.OperationalSpace(
-        model, frame, reference, kp, kd, rows=rows, period_s=period
+        model, frame, reference, kp=kp, kd=kd, rows=rows, period_s=period
     ),
     function=lambda law, n: _ct.ControlLaw(law, n),
     loop=lambda law, position=(), velocity=(), actuation=(), measured=0.0, acts=0.0, seed=0: _ct.Loop(

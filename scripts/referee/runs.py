@@ -55,7 +55,7 @@ def move(q: np.ndarray = Q2, duration: float = 0.25) -> Any:
 
 def of_method(name: str, engine: str) -> Case:
     """A swing with friction and a moving reference by one method; three methods choose their steps."""
-    fixed = name not in ("DOP853", "Rodas5P", "automatic")
+    fixed = name not in ("DOP853", "Rosenbrock", "automatic")
     plant = lib.plant(planar(), FX.viscous(0.5))
     return Case(
         lib.setup(
@@ -228,7 +228,7 @@ def miscellaneous() -> Iterator[tuple[str, Callable[[], Case]]]:
             lib.plant(lib.arm("flyball_governor"), *(
                 FX.line_spring_damper(f"{side}_rod", "slider", (0.5, 0, 0), (sign * 0.05, 0, 0), 8e5, 4e4, 0.5)
                 for side, sign in (("right", 1), ("left", -1)))),
-            np.zeros(4), [2 * np.pi, 0, 0, 0], 0.3, by=lib.method("Rodas5P", 1e-6), record=0.02,
+            np.zeros(4), [2 * np.pi, 0, 0, 0], 0.3, by=lib.method("Rosenbrock", 1e-6), record=0.02,
         )
     )  # fmt: skip
     yield (

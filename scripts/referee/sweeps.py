@@ -28,7 +28,7 @@ ROWS = (32, 48, 64)
 
 
 def _setup(*effects: Any, law: Any = None, by: str = "RK4", robot: Any = None, q0: Any = Q2, v0: Any = V2) -> Any:
-    fixed = by not in ("DOP853", "Rodas5P")
+    fixed = by not in ("DOP853", "Rosenbrock")
     plant = lib.plant(planar() if robot is None else robot, *effects)
     return lib.setup(
         plant, q0, v0, 0.2, law, lib.method(by, None if fixed else 1e-8), 2e-3 if fixed else None, 0.01,
@@ -81,7 +81,7 @@ def sampled() -> Any:
 
 
 def stiff() -> Any:
-    return _setup(FX.regularised_coulomb(2.0, 1e-2), FX.viscous(20.0), by="Rodas5P")
+    return _setup(FX.regularised_coulomb(2.0, 1e-2), FX.viscous(20.0), by="Rosenbrock")
 
 
 def springs() -> Any:

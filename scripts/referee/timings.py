@@ -169,7 +169,7 @@ def in_process() -> Iterator[tuple[str, Prepare]]:
     yield "simulate, DOP853", partial(simulated, lambda: under_pd(by("DOP853", 1e-8), None))
     yield (
         "simulate, Rodas5P",
-        partial(simulated, lambda: swing([FX.regularised_coulomb(2.0, 1e-3)], by("Rodas5P", 1e-8))),
+        partial(simulated, lambda: swing([FX.regularised_coulomb(2.0, 1e-3)], by("Rosenbrock", 1e-8))),
     )
     yield "simulate, Gauss 4", partial(simulated, lambda: under_pd(by("Gauss 4"), 5e-3))
     yield "simulate, time stepping", partial(simulated, lambda: swing(stops(), by("time stepping"), 1e-3))

@@ -91,9 +91,9 @@ def test_the_period_of_a_loop_about_a_block_is_that_of_its_discrete_matrix(ki: f
     """A mass under PID in zero-order hold, q and v in closed form between ticks."""
     kp, kd = 100.0, 20.0
     law = (
-        rd.control.PID(rd.control.hold([0.0]), kp, ki, kd, period_s=0.02)
+        rd.control.PID(rd.control.hold([0.0]), kp=kp, ki=ki, kd=kd, period_s=0.02)
         if ki
-        else rd.control.PD(rd.control.hold([0.0]), kp, kd, period_s=0.02)
+        else rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd, period_s=0.02)
     )
     advice = rd.advise(BLOCK, [0.1], duration_s=5.0, controller=law)
 
@@ -113,7 +113,7 @@ def test_the_panda_under_sampled_control() -> None:
     """Values by the exponential of the sampled system, found apart from this library."""
     arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
     q0 = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
-    law = rd.control.PDGravity(arm, rd.control.hold(q0), 1000.0, 60.0, period_s=2.5e-4)
+    law = rd.control.PDGravity(arm, rd.control.hold(q0), kp=1000.0, kd=60.0, period_s=2.5e-4)
     advice = rd.advise(arm, q0, controller=law, method="RK4", duration_s=0.2)
     assert advice.longest_period_s == pytest.approx(0.211e-3, rel=0.01)  # three digits
     assert advice.fastest.joint == "panda_joint7"
@@ -141,8 +141,10 @@ def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, la
     q = 0.3 * np.cos(np.arange(arm.n) + 0.4)
     inertia = np.diag(arm.M(q))
     gains = 400 * inertia, 36 * inertia
-    law = rd.control.PD(rd.control.hold(q + arm.N(q) / gains[0]), *gains, 1e-3)  # which holds the arm where it is
-    loop = rd.control.Loop(law, measurement_delay=late[0], actuation_delay=late[1])
+    law = rd.control.PD(
+        rd.control.hold(q + arm.N(q) / gains[0]), kp=gains[0], kd=gains[1], period_s=1e-3
+    )  # which holds the arm where it is
+    loop = rd.control.Loop(law, measurement_delay_periods=late[0], actuation_delay_periods=late[1])
     found = linearised(rd.Plant(arm), loop, 0.0, np.concatenate([q, 0 * q])).longest_period()
     assert growth(arm, q, gains, 0.999 * found, late) <= 1 + 1e-6  # gravity's slope is by differences
     assert growth(arm, q, gains, 1.001 * found, late) > 1 + 1e-5
@@ -151,14 +153,14 @@ def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, la
 def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
     """A mass under PD by differences through a filter, with a slow spring beside: its exact map, over two periods."""
     mass, kp, kd, slow, cutoff = 1.0, 100.0, 14.0, 60.0, 150.0
-    law = rd.control.PD(rd.control.hold([0.0]), kp, kd, 0.002)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd, period_s=0.002)
     both = TwoRates(law.reference, kp, kd, (0.0,), slow, 0.0, 2, 0.002)
     blocks: dict[str, Any] = {
         "velocity": [rd.control.Differences(), rd.control.LowPass(cutoff, 1)],
         "position": rd.control.Quantisation(1e-4),
     }
     loop = rd.control.Loop(
-        both, **blocks, actuation=[rd.control.RateLimit(9.0), rd.control.Noise(0.1)], measurement_delay=1.0
+        both, **blocks, actuation=[rd.control.RateLimit(9.0), rd.control.Noise(0.1)], measurement_delay_periods=1.0
     )
     found = linearised(rd.Plant(BLOCK), loop, 0.0, np.zeros(2)).longest_period()
 
@@ -183,13 +185,16 @@ def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
 def test_friction_a_thousand_times_faster_than_the_period_does_not_hide_its_limit() -> None:
     """Of m v̇ = u − b v with m/b ≪ T gives q⁺ = (1 − kp T/b) q: |·| = 1 at T = 2 b/kp, but for m/b."""
     b, kp = 1e6, 5e8
-    law, plant = rd.control.PD(rd.control.hold([0.0]), kp, 0.0, 1e-3), rd.Plant(BLOCK, [rd.effects.ViscousFriction(b)])
+    law, plant = (
+        rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=0.0, period_s=1e-3),
+        rd.Plant(BLOCK, [rd.effects.ViscousFriction(b)]),
+    )
     assert linearised(plant, law, 0.0, np.zeros(2)).longest_period() == pytest.approx(2 * b / kp, rel=1e-3)
 
 
 def test_a_loop_that_no_period_makes_stable_says_so() -> None:
     loop = rd.control.Loop(
-        rd.control.PD(rd.control.hold([0.0]), 1e4, 20.0, 1e-3),
+        rd.control.PD(rd.control.hold([0.0]), kp=1e4, kd=20.0, period_s=1e-3),
         velocity=rd.control.LowPass(5.0),
         actuation=rd.control.LowPass(30.0),
     )
@@ -256,6 +261,8 @@ def test_free_flight_bounds_no_step() -> None:
 
 def test_a_loop_that_is_damped_critically_has_a_fastest_motion() -> None:
     """Of x'' = −ω² x − 2 ω x': both eigenvalues are −ω, with one eigenvector."""
-    advice = rd.advise(BLOCK, [0.0], duration_s=0.1, controller=rd.control.PD(rd.control.hold([0.0]), 400.0, 40.0))
+    advice = rd.advise(
+        BLOCK, [0.0], duration_s=0.1, controller=rd.control.PD(rd.control.hold([0.0]), kp=400.0, kd=40.0)
+    )
     assert abs(advice.fastest.eigenvalue) == pytest.approx(20.0, rel=1e-3)  # of a double root, of the root of rounding
     assert advice.fastest.source == "control"

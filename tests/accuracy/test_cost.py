@@ -46,9 +46,9 @@ def compiled(of: rd.Setup) -> dict[str, int]:
 
 
 CONTROLLERS = {
-    "none": None, "continuous": rd.control.PD(rd.control.hold(Q), 10.0, 1.0),
-    "sampled": rd.control.PD(rd.control.hold(Q), 10.0, 1.0, period_s=0.01),
-    "states": rd.control.PID(rd.control.hold(Q), 10.0, 2.0, 1.0, period_s=0.01),
+    "none": None, "continuous": rd.control.PD(rd.control.hold(Q), kp=10.0, kd=1.0),
+    "sampled": rd.control.PD(rd.control.hold(Q), kp=10.0, kd=1.0, period_s=0.01),
+    "states": rd.control.PID(rd.control.hold(Q), kp=10.0, ki=2.0, kd=1.0, period_s=0.01),
 }  # fmt: skip
 
 

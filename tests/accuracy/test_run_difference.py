@@ -202,7 +202,7 @@ def test_each_setting_that_differs_is_named_and_no_other(changes: str) -> None:
         plan = rd.control.quintic(q, q + (0.3 if is_it("reference") else 0.2), 0.1)
         model = arm.with_(mass_scale=1.1) if is_it("model") else arm
         period = 0.002 if is_it("period") else 0.001
-        law = rd.control.ComputedTorque(model, plan, 101.0 if is_it("gain") else 100.0, 20.0, period_s=period)
+        law = rd.control.ComputedTorque(model, plan, kp=101.0 if is_it("gain") else 100.0, kd=20.0, period_s=period)
         moved = arm.with_(gravity=(0.0, 0.0, -1.0)) if is_it("gravity") else arm
         plant = rd.Plant(moved, [rd.effects.ViscousFriction(0.1000000001 if is_it("damping") else 0.1)])
         start = q + (0.01 if is_it("start") else 0.0)
@@ -267,7 +267,7 @@ def test_runs_are_named_by_both_settings_in_which_they_differ() -> None:
     arm, q = rd.load("planar_2r"), np.array([0.4, -0.7])
 
     def run(kp: float, kd: float, damping: float = 0.1) -> rd.Trajectory:
-        law = rd.control.PD(rd.control.hold(q + 0.1), kp, kd)
+        law = rd.control.PD(rd.control.hold(q + 0.1), kp=kp, kd=kd)
         plant = rd.Plant(arm, [rd.effects.ViscousFriction(damping)])
         return rd.simulate(plant, q0=q, duration_s=0.05, controller=law, estimate_error=False)
 

@@ -339,7 +339,7 @@ def test_other_programs_solve_the_same_equation(setup: rd.Setup, first: int) -> 
 def test_programs_that_cannot_do_a_scene_are_left_out_with_the_reason() -> None:
     arm = rd.load("planar_2r")
     plant = rd.Plant(arm, [rd.effects.DryFriction(0.1)])
-    sampled = rd.control.PD(rd.control.hold([0.0, 0.0]), 10.0, 1.0, period_s=0.01)
+    sampled = rd.control.PD(rd.control.hold([0.0, 0.0]), kp=10.0, kd=1.0, period_s=0.01)
     for setup, why in (
         (rd.Setup(plant, [0.4, 0.9], duration_s=0.5), "dry_friction is not supported"),
         (rd.Setup(rd.Plant(arm), [0.4, 0.9], controller=sampled, duration_s=0.5), "only a continuous PD"),

@@ -36,7 +36,7 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
 
 def test_a_sweep_that_is_not_complete_says_what_is_left(tmp_path: Path) -> None:
     path, out = scene(tmp_path), tmp_path / "out"
-    options = "--runs", "100", "--vary", "kp=uniform(low=10, high=20)", "--chunk", "10", "--share", "1/2"
+    options = "--runs", "100", "--vary", "kp=uniform(low=10, high=20)", "--chunk", "10", "--job", "1/2"
     said = command.run("sweep", str(path), "-o", str(out), *options)
     assert said.returncode == 0 and "5 of 10 chunks are missing" in said.stdout
     assert "5 of 10 chunks" in command.run("sweep", "status", str(out)).stdout

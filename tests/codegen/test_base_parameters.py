@@ -175,7 +175,7 @@ def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
     exact = rd.simulate(completed(given)[0], **options, engine="compiled")
     for other in (interpreted, exact):
         assert "right_angles" not in other.about and "right angles" not in other.summary
-    law = rd.control.PDGravity(given, rd.control.hold([0.3]), 5.0, 1.0)
+    law = rd.control.PDGravity(given, rd.control.hold([0.3]), kp=5.0, kd=1.0)
     run = rd.simulate(completed(given)[0], **options, engine="compiled", controller=law)
     assert run.about["right_angles"] == words
 

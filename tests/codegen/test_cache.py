@@ -150,7 +150,7 @@ def age(store: Store, name: str, seconds: float) -> None:
 
 def test_the_entries_not_used_for_longest_go(tmp_path: Path) -> None:
     """Four entries of 1000 bytes and less than 200 of heading fit; reading one makes it young."""
-    store = Store(tmp_path / "kernels", most_bytes=4800)
+    store = Store(tmp_path / "kernels", max_bytes=4800)
     keys = [digest_of_texts([str(number)]) for number in range(6)]
     for number, name in enumerate(keys[:4]):
         store.save(name, bytes(1000))
@@ -159,11 +159,11 @@ def test_the_entries_not_used_for_longest_go(tmp_path: Path) -> None:
     for name in keys[4:]:
         store.save(name, bytes(1000))
     assert {entry.key for entry in store.entries()} == {keys[0], *keys[3:]}
-    assert sum(entry.size for entry in store.entries()) <= store.most_bytes
+    assert sum(entry.size for entry in store.entries()) <= store.max_bytes
 
 
 def test_the_entry_just_written_stays_whatever_the_clock_says(tmp_path: Path) -> None:
-    store = Store(tmp_path / "kernels", most_bytes=2000)
+    store = Store(tmp_path / "kernels", max_bytes=2000)
     store.save(KEY, bytes(1000))
     age(store, f"{KEY}.kernel", -1e6)
     store.save(OTHER, bytes(1000))
@@ -171,7 +171,7 @@ def test_the_entry_just_written_stays_whatever_the_clock_says(tmp_path: Path) ->
 
 
 def test_an_entry_larger_than_the_cache_is_not_kept(store: Store, kept: Path) -> None:
-    small = Store(store.folder, most_bytes=1000)
+    small = Store(store.folder, max_bytes=1000)
     small.save(OTHER, bytes(1000))
     assert [entry.key for entry in small.entries()] == [KEY]
 
@@ -220,7 +220,7 @@ import sys
 from pathlib import Path
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest_of_texts
-store = Store(Path(sys.argv[1]), most_bytes=3_000_000)
+store = Store(Path(sys.argv[1]), max_bytes=3_000_000)
 payloads = {digest_of_texts([str(n)]): bytes([n]) * 500_000 for n in range(4)}
 found = 0
 for turn in range(16):

@@ -280,7 +280,7 @@ def test_numbers_that_a_controller_follows_and_knows_are_no_structure() -> None:
     known = []
     for x, scale in ((1.0, 1.0), (2.0, 1.0), (1.0, 1.1)):
         model = ARM.with_(payload=rd.Payload("tip", x), gravity=(0.0, 0.0, -9.0 - x), mass_scale=scale)
-        inner = rd.control.ComputedTorque(model, rd.control.hold([x, 0.2]), 10.0 * x, x, period_s=0.01)
+        inner = rd.control.ComputedTorque(model, rd.control.hold([x, 0.2]), kp=10.0 * x, kd=x, period_s=0.01)
         loop = rd.control.Loop(inner, velocity=[rd.control.LowPass(3.0 * x)])
         known.append([structure(StateEquation(rd.Plant(ARM), each)).described for each in (inner, loop)])
     assert known[0] == known[1]

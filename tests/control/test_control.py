@@ -20,13 +20,15 @@ KP, KI, KD = np.array([30.0, 20.0, 10.0]), np.array([12.0, 9.0, 4.0]), 5.0
 
 def test_pd_is_a_spring_and_a_damper() -> None:
     q_d, v_d, _ = MOTION.at(T)
-    np.testing.assert_allclose(PD(MOTION, KP, KD).torque(T, Q, V, NONE), KP * (q_d - Q) + KD * (v_d - V), rtol=1e-15)
+    np.testing.assert_allclose(
+        PD(MOTION, kp=KP, kd=KD).torque(T, Q, V, NONE), KP * (q_d - Q) + KD * (v_d - V), rtol=1e-15
+    )
 
 
 def test_pid_below_its_limit_is_pd_and_the_integral_of_the_error() -> None:
-    controller, z = PID(MOTION, KP, KI, KD, effort_limit=1e3), np.array([0.3, -0.2, 0.9])
+    controller, z = PID(MOTION, kp=KP, ki=KI, kd=KD, effort_limit=1e3), np.array([0.3, -0.2, 0.9])
     q_d = MOTION.at(T)[0]
-    expected = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
+    expected = PD(MOTION, kp=KP, kd=KD).torque(T, Q, V, NONE) + z
     np.testing.assert_allclose(controller.torque(T, Q, V, z), expected, rtol=1e-15)
     np.testing.assert_allclose(controller.state_rate(T, Q, V, z), KI * (q_d - Q), rtol=1e-15)
     assert controller.state_size == 3
@@ -34,8 +36,8 @@ def test_pid_below_its_limit_is_pd_and_the_integral_of_the_error() -> None:
 
 def test_pid_above_its_limit_gives_the_limit_and_lets_the_excess_flow_back() -> None:
     limit, z = np.array([2.0, 1.0, np.inf]), np.array([40.0, -50.0, 3.0])
-    controller = PID(MOTION, KP, KI, KD, effort_limit=limit, tracking_time_s=0.25)
-    desired = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
+    controller = PID(MOTION, kp=KP, ki=KI, kd=KD, effort_limit=limit, tracking_time_s=0.25)
+    desired = PD(MOTION, kp=KP, kd=KD).torque(T, Q, V, NONE) + z
     np.testing.assert_allclose(controller.torque(T, Q, V, z), [2.0, -1.0, desired[2]], rtol=1e-15)
     expected = KI * (MOTION.at(T)[0] - Q) - np.array([desired[0] - 2, desired[1] + 1, 0]) / 0.25
     np.testing.assert_allclose(controller.state_rate(T, Q, V, z), expected, rtol=1e-14)
@@ -71,20 +73,20 @@ def one_joint(controller: Controller, until: float, *, push: float = PUSH, limit
 def test_pid_removes_a_constant_disturbance_and_pd_does_not() -> None:
     """Closed form: M s³ + kd s² + kp s + ki = 0 gives e(t) = Σ c_i e^{s_i t}; PD is left with push/kp."""
     kp, ki, kd = 40.0, 60.0, 9.0
-    t, q, _, z = one_joint(PID(hold([0.0]), kp, ki, kd), 12.0, at=np.linspace(0, 12, 50))
+    t, q, _, z = one_joint(PID(hold([0.0]), kp=kp, ki=ki, kd=kd), 12.0, at=np.linspace(0, 12, 50))
     s = np.roots([MASS, kd, kp, ki])
     c = np.linalg.solve(np.vander(s, increasing=True).T, [0, 0, PUSH / MASS])  # q, v, a at t = 0
     np.testing.assert_allclose(q, (np.exp(np.outer(t, s)) @ c).real, atol=1e-9)  # 1e-10 a step, some hundred steps
     assert abs(q[-1]) < 1e-8
     np.testing.assert_allclose(z[-1], -PUSH, rtol=1e-6)  # the integral carries the push
-    assert one_joint(PD(hold([0.0]), kp, kd), 12.0)[1][-1] == pytest.approx(PUSH / kp, rel=1e-8)
+    assert one_joint(PD(hold([0.0]), kp=kp, kd=kd), 12.0)[1][-1] == pytest.approx(PUSH / kp, rel=1e-8)
 
 
 def test_the_integral_of_a_blocked_joint_settles() -> None:
     """At a held error z tends to L + T_t ki e − kp e as 1 − e^{−t/T_t}; unguarded it grows as ki e t."""
     limit, time, e = 5.0, 0.4, 2.0
-    blocked = PID(hold([e]), 40.0, 60.0, 9.0, effort_limit=limit, tracking_time_s=time)
-    free = PID(hold([e]), 40.0, 60.0, 9.0)
+    blocked = PID(hold([e]), kp=40.0, ki=60.0, kd=9.0, effort_limit=limit, tracking_time_s=time)
+    free = PID(hold([e]), kp=40.0, ki=60.0, kd=9.0)
     still = np.zeros(1)
     for controller, expected in [
         (blocked, (limit + time * 60 * e - 40 * e) * (1 - np.exp(-3 / time))),
@@ -102,11 +104,11 @@ def test_anti_windup_bounds_the_integral_and_the_overshoot() -> None:
     While the error is positive z falls wherever z > L + T_t ki e − kp e + kd v, which kp ≥ T_t ki keeps below L + kd v.
     """
     kp, ki, kd, limit, step = 40.0, 30.0, 9.0, 5.0, 2.0
-    guarded = PID(hold([step]), kp, ki, kd, effort_limit=limit)
+    guarded = PID(hold([step]), kp=kp, ki=ki, kd=kd, effort_limit=limit)
     assert guarded.tracking_time_s == pytest.approx(np.sqrt(kd / ki))
     assert kp >= np.sqrt(kd / ki) * ki
     _, q, v, z = one_joint(guarded, 8.0, push=0.0, limit=limit)
-    q_free = one_joint(PID(hold([step]), kp, ki, kd), 8.0, push=0.0, limit=limit)[1]
+    q_free = one_joint(PID(hold([step]), kp=kp, ki=ki, kd=kd), 8.0, push=0.0, limit=limit)[1]
     assert z.max() <= limit + kd * v.max()
     assert q.max() < 1.1 * step
     assert q_free.max() > 1.5 * step
@@ -117,19 +119,19 @@ def test_sampled_states_tend_to_the_continuous_ones() -> None:
     """The rule z ← z + period · rate is of first order: a quarter of the period, a quarter of the error."""
     errors = []
     for period in (0.008, 0.002):
-        controller, x, z = PID(hold([1.0]), 40.0, 60.0, 9.0, period_s=period), np.zeros(2), np.zeros(1)
+        controller, x, z = PID(hold([1.0]), kp=40.0, ki=60.0, kd=9.0, period_s=period), np.zeros(2), np.zeros(1)
         for k in range(round(0.8 / period)):
             q, v, t = x[:1], x[1:], k * period
             a = (controller.torque(t, q, v, z)[0] + PUSH) / MASS
             z = controller.next_state(t, q, v, z)
             x = x + period * np.array([x[1] + period * a / 2, a])  # exact for a held torque
-        continuous = one_joint(PID(hold([1.0]), 40.0, 60.0, 9.0), 0.8)
+        continuous = one_joint(PID(hold([1.0]), kp=40.0, ki=60.0, kd=9.0), 0.8)
         errors.append([x[0] - continuous[1][-1], z[0] - continuous[3][-1]])
     np.testing.assert_allclose(np.divide(*errors), 4, rtol=0.15)  # the next order: period · ω is some 5 %
 
 
 def test_a_stateless_controller_has_no_states() -> None:
-    controller = PD(MOTION, 1.0, 1.0, period_s=0.01)
+    controller = PD(MOTION, kp=1.0, kd=1.0, period_s=0.01)
     assert controller.state_size == 0
     assert controller.next_state(T, Q, V, NONE).shape == (0,)
     assert controller.n == 3
@@ -141,25 +143,25 @@ ROBOT = rd.load("planar_2r")
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: PD(MOTION, -1.0, 1.0), "kp must not be negative"),
-        (lambda: PD(MOTION, 1.0, [1.0, 2.0]), r"kd must be one number or of shape \(3,\), got \(2,\)"),
-        (lambda: PD(MOTION, "stiff", 1.0), "kp must be real numbers"),
-        (lambda: PD(MOTION, 1.0, np.inf), "kd must be finite"),
+        (lambda: PD(MOTION, kp=-1.0, kd=1.0), "kp must not be negative"),
+        (lambda: PD(MOTION, kp=1.0, kd=[1.0, 2.0]), r"kd must be one number or of shape \(3,\), got \(2,\)"),
+        (lambda: PD(MOTION, kp="stiff", kd=1.0), "kp must be real numbers"),
+        (lambda: PD(MOTION, kp=1.0, kd=np.inf), "kd must be finite"),
         # names of joints: a controller such as PD knows none, so that nothing could resolve them later
         *(
-            (lambda gain=gain: PD(MOTION, gain, KD), "kp must be real numbers, one or of shape")
+            (lambda gain=gain: PD(MOTION, kp=gain, kd=KD), "kp must be real numbers, one or of shape")
             for gain in ({"joint_1": 5.0}, "urdf", None)
         ),
-        (lambda: PD(MOTION, 1.0, 1.0, period_s=-0.1), "period_s must be a positive number of seconds"),
-        (lambda: PD([0.0], 1.0, 1.0), "reference must be a PiecewisePolynomial"),
-        (lambda: PID(MOTION, 1.0, -1.0, 1.0), "ki must not be negative"),
-        (lambda: PID(MOTION, 1.0, 1.0, 1.0, effort_limit=0.0), "effort_limit must be positive"),
-        (lambda: PID(MOTION, 1.0, 1.0, 1.0, effort_limit="no"), "effort_limit must be real numbers"),
-        (lambda: PID(MOTION, 1.0, 1.0, 1.0, tracking_time_s=0.0), "tracking_time_s must be positive"),
-        (lambda: ComputedTorque(ROBOT, MOTION, 1.0, 1.0), "the model has 2 joints, but the reference has 3"),
-        (lambda: FeedForward(ROBOT, hold([0.0, 0.0]), 1.0, [1.0]), r"kd must be one number or of shape \(2,\)"),
-        (lambda: gains_from(0.0, 1.0), "inertia_diagonal and bandwidth_rad_s must be positive"),
-        (lambda: PD(MOTION, 1.0, 1.0, period_s=[]), r"period_s must be one number, got shape \(0,\)"),
+        (lambda: PD(MOTION, kp=1.0, kd=1.0, period_s=-0.1), "period_s must be a positive number of seconds"),
+        (lambda: PD([0.0], kp=1.0, kd=1.0), "reference must be a PiecewisePolynomial"),
+        (lambda: PID(MOTION, kp=1.0, ki=-1.0, kd=1.0), "ki must not be negative"),
+        (lambda: PID(MOTION, kp=1.0, ki=1.0, kd=1.0, effort_limit=0.0), "effort_limit must be positive"),
+        (lambda: PID(MOTION, kp=1.0, ki=1.0, kd=1.0, effort_limit="no"), "effort_limit must be real numbers"),
+        (lambda: PID(MOTION, kp=1.0, ki=1.0, kd=1.0, tracking_time_s=0.0), "tracking_time_s must be positive"),
+        (lambda: ComputedTorque(ROBOT, MOTION, kp=1.0, kd=1.0), "the model has 2 joints, but the reference has 3"),
+        (lambda: FeedForward(ROBOT, hold([0.0, 0.0]), kp=1.0, kd=[1.0]), r"kd must be one number or of shape \(2,\)"),
+        (lambda: gains_from(0.0, 1.0), "inertia_diagonal must be positive"),
+        (lambda: PD(MOTION, kp=1.0, kd=1.0, period_s=[]), r"period_s must be one number, got shape \(0,\)"),
         (lambda: gains_from([1.0, 2.0], [1.0, 2.0, 3.0]), "shapes do not match"),
     ],
 )
@@ -199,7 +201,7 @@ def test_a_sampled_law_is_defined_by_its_next_state_alone(engine: str, in_loop: 
     """Equal to the law by its rate, to rounding of z over 30 ticks."""
     arm, ends = rd.load("planar_2r"), []
     for law in (Averaging(), AveragingByRate()):
-        controller = rd.control.Loop(law, actuation_delay=0.5) if in_loop else law
+        controller = rd.control.Loop(law, actuation_delay_periods=0.5) if in_loop else law
         run = rd.simulate(arm, [0.1, 0.2], duration_s=0.3, controller=controller, engine=engine, estimate_error=False)
         ends.append(run.q[-1])
     np.testing.assert_allclose(*ends, rtol=1e-12)

@@ -118,7 +118,7 @@ def test_with_the_exact_model_the_task_error_is_linear(case: str) -> None:
     q, v = state(robot)
     reference, kp, kd = general_pose(robot, frame, q), np.linspace(60, 120, 6), np.linspace(12, 20, 6)
     controller = OperationalSpace(
-        robot, frame, reference, kp, kd, posture=0.4 * q, posture_kp=25.0, posture_kd=10.0, threshold=EXACT
+        robot, frame, reference, kp=kp, kd=kd, posture=0.4 * q, posture_kp=25.0, posture_kd=10.0, threshold=EXACT
     )
     p_d, R_d, twist_d, rate_d = reference.at(0.3)
     g, twist = robot.placement(q, frame), robot.jacobian(q, frame) @ v
@@ -135,7 +135,7 @@ def test_what_the_task_leaves_free_goes_to_the_posture(case: str) -> None:
     q, v = state(robot)
     posture_kp, posture_kd = np.linspace(20, 30, 7), np.linspace(9, 12, 7)
     options = {"posture": 0.4 * q, "posture_kp": posture_kp, "posture_kd": posture_kd, "rows": rows}
-    controller = OperationalSpace(robot, frame, general_pose(robot, frame, q), 80.0, 15.0, **options)
+    controller = OperationalSpace(robot, frame, general_pose(robot, frame, q), kp=80.0, kd=15.0, **options)
     tau = controller.torque(0.3, q, v, NONE)
     M, a = robot.M(q), robot.forward_dynamics(q, v, tau)
     free = np.linalg.svd(robot.jacobian(q, frame)[list(rows)])[2][len(rows) :]
@@ -152,7 +152,9 @@ def test_position_task_follows_a_circle_and_the_posture_takes_the_rest() -> None
     x = np.array([10.0, 0.0, -3.0]) / np.sqrt(109)  # x, projected onto the plane of the circle
     reference = circle(start - 0.1 * x, 0.1, [0.3, 0.0, 1.0], 0.8, turns=0.5, toward=x)
     np.testing.assert_allclose(reference.at(0.0)[0], start, atol=1e-15)
-    controller = OperationalSpace(robot, frame, reference, 400.0, 40.0, posture=q0, posture_kp=100.0, posture_kd=20.0)
+    controller = OperationalSpace(
+        robot, frame, reference, kp=400.0, kd=40.0, posture=q0, posture_kp=100.0, posture_kd=20.0
+    )
     n = robot.n
 
     def rate(t: float, x: np.ndarray) -> np.ndarray:
@@ -199,7 +201,7 @@ def test_controller_near_the_straight_arm_asks_for_no_more_than_its_task(angle: 
     """The whole torque less C v + N and the posture is the bounded τ_x: 1e-9 of it, and finite at the singularity."""
     q, v = np.array([0.4, angle]), np.array([0.5, -0.4])
     reference = line([0.3, 0.2, 0.0], [-0.5, 0.9, 0.0], 1.0)
-    controller = OperationalSpace(PLANAR, "tip", reference, 50.0, 10.0, rows=(0, 1))
+    controller = OperationalSpace(PLANAR, "tip", reference, kp=50.0, kd=10.0, rows=(0, 1))
     task, desired = task_dynamics(PLANAR, q, v, "tip", rows=(0, 1)), controller.task_acceleration(0.5, q, v)
     tau = controller.torque(0.5, q, v, NONE) - PLANAR.inverse_dynamics(q, v, 0 * q)
     np.testing.assert_allclose(tau, task.J.T @ task.Lambda @ (desired - task.drift), atol=1e-9 * np.abs(tau).max())
@@ -233,18 +235,30 @@ FREE = line([0.1, 0.2, 0.3], [0.4, 0.5, 0.6], 1.0)
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: OperationalSpace(PANDA, "panda_hand", hold([0.0] * 7), 1.0, 1.0), "reference must be a Cartesian"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, rows=POSE), "which the reference leaves free"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, rows=(1, 0)), "rows must be increasing"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, rows=(0.5,)), "rows must be increasing"),
         (
-            lambda: OperationalSpace(PANDA, "panda_hand", R_HOLD, [1.0] * 3, 1.0),
+            lambda: OperationalSpace(PANDA, "panda_hand", hold([0.0] * 7), kp=1.0, kd=1.0),
+            "reference must be a Cartesian",
+        ),
+        (
+            lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, rows=POSE),
+            "which the reference leaves free",
+        ),
+        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, rows=(1, 0)), "rows must be increasing"),
+        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, rows=(0.5,)), "rows must be increasing"),
+        (
+            lambda: OperationalSpace(PANDA, "panda_hand", R_HOLD, kp=[1.0] * 3, kd=1.0),
             r"kp must be one number or of shape \(6,\)",
         ),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, -1.0), "kd must not be negative"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, posture_kp=2.0), "posture_kp needs a posture"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, posture=[0.0]), "posture must have shape"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, threshold=0.0), "threshold must be positive"),
+        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=-1.0), "kd must not be negative"),
+        (
+            lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, posture_kp=2.0),
+            "posture_kp needs a posture",
+        ),
+        (lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, posture=[0.0]), "posture must have shape"),
+        (
+            lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, threshold=0.0),
+            "threshold must be positive",
+        ),
     ],
 )
 def test_task_controllers_without_meaning_are_refused(make, message: str) -> None:
@@ -254,4 +268,4 @@ def test_task_controllers_without_meaning_are_refused(make, message: str) -> Non
 
 def test_an_unknown_frame_is_told_at_once() -> None:
     with pytest.raises(QueryError, match="panda_hand"):
-        OperationalSpace(PANDA, "panda_hnad", FREE, 1.0, 1.0)
+        OperationalSpace(PANDA, "panda_hnad", FREE, kp=1.0, kd=1.0)

@@ -107,7 +107,7 @@ def test_names_of_the_log_are_given_by_joint(tmp_path: Path) -> None:
 
 def test_a_log_of_rd_export_is_read_back(tmp_path: Path) -> None:
     """Positions to the bit at its samples, by either topic."""
-    controller = rd.control.PD(rd.control.quintic([0.1] * 6, [0.3] * 6, 0.3), 400.0, 40.0)
+    controller = rd.control.PD(rd.control.quintic([0.1] * 6, [0.3] * 6, 0.3), kp=400.0, kd=40.0)
     run = rd.simulate(ARM, [0.1] * 6, duration_s=0.3, controller=controller)
     path = run.save(tmp_path / "run.mcap")
     assert run.desired is not None

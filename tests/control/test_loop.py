@@ -19,7 +19,7 @@ from tests.two_rates import TwoRates
 
 T, PERIODS = 0.03, 40
 KP, KD, TARGET = np.array([60.0, 45.0]), np.array([5.0, 4.0]), np.array([0.5, 0.2])
-PD = rd.control.PD(rd.control.hold(TARGET), KP, KD, T)
+PD = rd.control.PD(rd.control.hold(TARGET), kp=KP, kd=KD, period_s=T)
 PLANT = plant()
 NEAR = 1e-11  # rtol 1e-12 over 1.2 s, and rounding of the exponentials
 
@@ -54,7 +54,7 @@ def differences(made: rd.Trajectory, truth: Exact) -> float:
     [(0.25, 0.75), (1.6, 2.45), *long([(0, 0), (0, 0.37), (0.37, 0), (1, 0.5), (0, 2), (2, 1)])],
 )
 def test_delays_are_those_of_the_definition(engine: str, measured: float, acts: float) -> None:
-    loop = rd.control.Loop(PD, measurement_delay=measured, actuation_delay=acts)
+    loop = rd.control.Loop(PD, measurement_delay_periods=measured, actuation_delay_periods=acts)
     assert differences(run(loop, engine), exact(law, T, PERIODS, measured, acts)) < NEAR
 
 
@@ -128,7 +128,7 @@ def test_the_rate_limit_of_the_torque() -> None:
         before.append(before[-1] + np.clip(step, -rate * T, rate * T))
         return before[-1]
 
-    loop = rd.control.Loop(PD, actuation=rd.control.RateLimit(rate), actuation_delay=0.5)
+    loop = rd.control.Loop(PD, actuation=rd.control.RateLimit(rate), actuation_delay_periods=0.5)
     assert differences(run(loop), exact(by_hand, T, PERIODS, 0, 0.5)) < NEAR
     assert limited[0] and not limited[-1]
 
@@ -144,7 +144,7 @@ def test_two_rates(engine: str, late: float) -> None:
             kept.append(np.array([9.0, 8.0]) * ([0.1, -0.3] - q) - np.array([0.5, 0.4]) * v)
         return law(k, q, v) + kept[-1]
 
-    made = run(rd.control.Loop(both, measurement_delay=late) if late else both, engine)
+    made = run(rd.control.Loop(both, measurement_delay_periods=late) if late else both, engine)
     assert differences(made, exact(by_hand, T, PERIODS, late)) < NEAR
 
 
@@ -156,8 +156,8 @@ def test_the_integral_of_a_pid_is_that_of_what_is_measured() -> None:
         z.append(z[-1] + T * ki * (TARGET - q))
         return law(k, q, v) + z[-2]
 
-    pid = rd.control.PID(rd.control.hold(TARGET), KP, ki, KD, period_s=T)
-    late = rd.control.Loop(pid, measurement_delay=0.75)
+    pid = rd.control.PID(rd.control.hold(TARGET), kp=KP, ki=ki, kd=KD, period_s=T)
+    late = rd.control.Loop(pid, measurement_delay_periods=0.75)
     assert differences(run(late), exact(by_hand, T, PERIODS, 0.75)) < NEAR
 
 
@@ -166,8 +166,8 @@ EVERYTHING = rd.control.Loop(
     position=[rd.control.Noise(1e-4), rd.control.Quantisation(1e-3)],
     velocity=[rd.control.Differences(), rd.control.LowPass(40.0)],
     actuation=[rd.control.Noise(0.1), rd.control.RateLimit(300.0), rd.control.Quantisation(0.02)],
-    measurement_delay=1.25, actuation_delay=0.5,
-    seed=7,
+    measurement_delay_periods=1.25, actuation_delay_periods=0.5,
+    noise_seed=7,
 )  # fmt: skip
 
 
@@ -224,7 +224,7 @@ def test_a_loop_of_nothing_adds_no_instruction() -> None:
     """And a run without a controller, or with a bare one, has the instructions that it had."""
     counts = [
         {name: len(each) for name, each in machine_code(StateEquation(PLANT, x)).code.programs.items()}
-        for x in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay=0.5))
+        for x in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay_periods=0.5))
     ]
     assert counts[0] == counts[1]
     assert counts[0]["rate"] == counts[2]["rate"]  # what a loop does, it does at ticks
@@ -232,17 +232,17 @@ def test_a_loop_of_nothing_adds_no_instruction() -> None:
 
 
 def test_what_a_loop_costs_is_told_apart_from_its_controller() -> None:
-    setup = rd.Setup(PLANT, Q0, V0, 1.0, rd.control.Loop(PD, actuation_delay=0.5))
+    setup = rd.Setup(PLANT, Q0, V0, 1.0, rd.control.Loop(PD, actuation_delay_periods=0.5))
     assert dict(parts(setup))["loop"].controller is PD
     assert "loop" not in dict(parts(replace(setup, controller=PD)))
 
 
 def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
     """They do not change between ticks: the mean of squares of the local error is that of the others."""
-    arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), 0.0, 0.0, 1.0)
+    arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), kp=0.0, kd=0.0, period_s=1.0)
     made = [
         rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, method="DOP853", estimate_error=False)
-        for x in (free, rd.control.Loop(free, actuation_delay=50))
+        for x in (free, rd.control.Loop(free, actuation_delay_periods=50))
     ]
     assert made[0].statistics.steps == made[1].statistics.steps
     np.testing.assert_allclose(made[0].q, made[1].q, atol=1e-12)  # an rtol that differs in its last bit
@@ -250,7 +250,7 @@ def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
 
 def test_the_last_torque_is_that_of_the_last_tick() -> None:
     """Where a run ends between two ticks."""
-    for controller in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay=0.75)):
+    for controller in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay_periods=0.75)):
         made = run(controller, periods=PERIODS - 0.5)  # type: ignore[arg-type]
         longer = run(controller)
         np.testing.assert_allclose(made.u[-1], longer.u[len(made.t) - 1], atol=1e-12)
@@ -261,7 +261,9 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     """Damping of 2.24/T reverses at each tick, whether there are one or two instants in a period."""
     M = np.linalg.inv(matrices()[1][2:])
     kd = 2.24 / T / np.abs(np.linalg.eigvals(np.linalg.inv(M))).max()
-    loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), 0.0, kd, T), actuation_delay=late)
+    loop = rd.control.Loop(
+        rd.control.PD(rd.control.hold(TARGET), kp=0.0, kd=kd, period_s=T), actuation_delay_periods=late
+    )
     for integrator in ("RK4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             options = {"method": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
@@ -291,16 +293,19 @@ def test_what_is_rounded_shows_no_order() -> None:
 def test_loops_that_have_no_meaning_are_refused() -> None:
     block, hold = rd.control.Quantisation(1e-3), rd.control.hold(TARGET)
     wrong: list[tuple[object, str]] = [
-        (lambda: rd.control.Loop(rd.control.PD(hold, 1.0, 1.0)), "is continuous"),
+        (lambda: rd.control.Loop(rd.control.PD(hold, kp=1.0, kd=1.0)), "is continuous"),
         (lambda: rd.control.Loop(rd.control.Loop(PD)), "must not be a Loop"),
         (lambda: rd.control.Loop(PD, position=rd.control.Differences()), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[block, rd.control.Differences()]), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(np.pi / T)]), "cutoff_rad_s must be less than"),
         (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(1.0, 3)]), "order"),
         (lambda: rd.control.Loop(PD, position=[rd.control.Quantisation([1.0, 2.0, 3.0])]), r"shape \(2,\)"),
-        (lambda: rd.control.Loop(PD, measurement_delay=-0.5), "from 0 to 1000"),
-        (lambda: rd.control.Loop(PD, measurement_delay=0.5, actuation_delay=0.5 + 1e-8), "two instants less than"),
-        (lambda: rd.control.Loop(PD, seed=-1), "whole number"),
+        (lambda: rd.control.Loop(PD, measurement_delay_periods=-0.5), "from 0 to 1000"),
+        (
+            lambda: rd.control.Loop(PD, measurement_delay_periods=0.5, actuation_delay_periods=0.5 + 1e-8),
+            "two instants less than",
+        ),
+        (lambda: rd.control.Loop(PD, noise_seed=-1), "whole number"),
         (lambda: rd.control.Loop(PD, position=["noise"]), "must be blocks"),  # type: ignore[list-item]
     ]
     for make, words in wrong:

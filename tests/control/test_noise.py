@@ -64,7 +64,9 @@ def test_machine_code_draws_the_same_bits() -> None:
 def test_noise_is_the_same_alone_in_batches_and_in_threads() -> None:
     """Of a torque too weak to move the arm, u = kp (0 − q − ξ) = −kp ξ is the noise itself, bit by bit."""
     loop = rd.control.Loop(
-        rd.control.PD(rd.control.hold([0.0, 0.0]), WEAK, 0.0, PERIOD), position=rd.control.Noise(1.0), seed=SEED
+        rd.control.PD(rd.control.hold([0.0, 0.0]), kp=WEAK, kd=0.0, period_s=PERIOD),
+        position=rd.control.Noise(1.0),
+        noise_seed=SEED,
     )
     given = {"duration_s": TICKS * PERIOD, "record_every_s": PERIOD}
     expected = [-WEAK * deviates(SEED, run, TICKS + 1, 2) for run in range(130)]
@@ -84,9 +86,9 @@ def test_noise_is_the_same_alone_in_batches_and_in_threads() -> None:
 def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
     """A tick of several instants has one; a companion of other steps has the same, so that errors can be estimated."""
     loop = rd.control.Loop(
-        rd.control.PD(rd.control.hold([0.0, 0.0]), WEAK, 0.0, PERIOD), position=rd.control.Noise(1.0),
-        measurement_delay=0.3,
-        actuation_delay=1.5, seed=4,
+        rd.control.PD(rd.control.hold([0.0, 0.0]), kp=WEAK, kd=0.0, period_s=PERIOD), position=rd.control.Noise(1.0),
+        measurement_delay_periods=0.3,
+        actuation_delay_periods=1.5, noise_seed=4,
     )  # fmt: skip
     run = rd.simulate(
         ARM, [0.0, 0.0], controller=loop, method="RK4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD
@@ -101,7 +103,7 @@ def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
 def test_noise_makes_no_velocity_at_the_first_tick() -> None:
     """Before the start the arm was measured where it starts, with the noise of the first tick."""
     noise = {"position": rd.control.Noise(1e-3), "velocity": rd.control.Differences()}
-    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0, 0.0]), 0.0, WEAK, PERIOD), **noise)  # type: ignore[arg-type]
+    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0, 0.0]), kp=0.0, kd=WEAK, period_s=PERIOD), **noise)  # type: ignore[arg-type]
     run = rd.simulate(ARM, [0.3, 0.2], controller=loop, duration_s=0.1, record_every_s=PERIOD, estimate_error=False)
     assert not run.u[0].any()
     expected = -WEAK * np.diff(0.2 + 1e-3 * deviates(0, 0, 11, 2)[:, 1]) / PERIOD

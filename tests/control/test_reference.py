@@ -294,7 +294,7 @@ def test_the_estimate_along_dense_samples_is_honest() -> None:
     """
     arm, t = rd.load("planar_2r"), np.linspace(0, 0.3, 101)
     reference = Samples(t, *motion(t)[:2])
-    controller = rd.control.ComputedTorque(arm, reference, 100.0, 20.0)
+    controller = rd.control.ComputedTorque(arm, reference, kp=100.0, kd=20.0)
     setup = rd.Setup(
         rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, method="RK4", step_s=5e-3
     )

@@ -49,7 +49,7 @@ def test_a_link_with_another_mass_and_inertia_is_that_of_an_edited_file() -> Non
 
 def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
     plan = rd.control.quintic(STATES[0], STATES[0] + 0.4, 0.2)
-    control = None if model is None else rd.control.ComputedTorque(model, plan, 50.0, 9.0)
+    control = None if model is None else rd.control.ComputedTorque(model, plan, kp=50.0, kd=9.0)
     return rd.Setup(
         rd.Plant(robot, [rd.effects.ViscousFriction(0.3)]), STATES[0], STATES[1], duration_s=0.2, controller=control,
         method="RK4", step_s=1e-3, record_every_s=0.02, estimate_error=False,

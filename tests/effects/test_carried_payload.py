@@ -115,7 +115,7 @@ def test_what_is_stuck_is_kicked_loose_and_what_rests_at_a_stop_stays_above_it(e
         rd.effects.CarriedPayload(BODY, 0.2, 0.6),
         rd.effects.CarriedPayload(rd.Payload("tip", 0.3), 0.2, 0.45, at_rest=False),
     ]  # fmt: skip
-    control = rd.control.PD(rd.control.quintic(Q, [0.9, 1.1], 0.8), 40.0, 8.0, period_s=0.02)
+    control = rd.control.PD(rd.control.quintic(Q, [0.9, 1.1], 0.8), kp=40.0, kd=8.0, period_s=0.02)
     options = {"method": TIGHT, "engine": engine, "record_every_s": 0.01, "estimate_error": False}
     run = rd.simulate(rd.Plant(ARM, effects), Q, duration_s=1.0, controller=control, **options)
     names = [each.name for each in run.events]

@@ -153,7 +153,7 @@ class Halved(Block):
     ],
 )
 def test_what_may_change_unseen_is_not_declared(effects: Any, block: Any, said: str) -> None:
-    pd = rd.control.PD(rd.control.hold(Q), 4.0, 1.0, period_s=0.01)
+    pd = rd.control.PD(rd.control.hold(Q), kp=4.0, kd=1.0, period_s=0.01)
     controller = None if block is None else rd.control.Loop(pd, velocity=[block])
     found = undeclared(rd.Plant(ARM, effects), controller)
     assert [why for _, why in found] == [] if not said else said in found[0][1]
@@ -186,7 +186,7 @@ def test_each_part_of_the_library_declares_as_a_users_does(base: type, name: str
 
 
 def test_no_part_of_the_library_is_undeclared() -> None:
-    sampled = rd.control.PD(rd.control.hold(Q), 4.0, 1.0, period_s=0.01)
+    sampled = rd.control.PD(rd.control.hold(Q), kp=4.0, kd=1.0, period_s=0.01)
     blocks = [rd.control.Noise(0.1), rd.control.LowPass(3.0), rd.control.Quantisation(0.1)]
     loop = rd.control.Loop(
         sampled,
@@ -196,8 +196,8 @@ def test_no_part_of_the_library_is_undeclared() -> None:
     effects = [example(name) for name in EFFECTS]
     for controller in (
         loop,
-        rd.control.PID(rd.control.hold(Q), 4.0, 1.0, 1.0),
-        rd.control.FeedForward(ARM, rd.control.hold(Q), 4.0, 1.0),
+        rd.control.PID(rd.control.hold(Q), kp=4.0, ki=1.0, kd=1.0),
+        rd.control.FeedForward(ARM, rd.control.hold(Q), kp=4.0, kd=1.0),
     ):
         assert undeclared(rd.Plant(ARM, effects), controller) == ()
 
@@ -353,7 +353,7 @@ SCENES = {
     "friction": ([rd.effects.ViscousFriction(0.3), rd.effects.RegularisedCoulombFriction(0.4, 0.1)], None, "auto"),
     "stops": (rd.effects.joint_stops(-0.9, 0.9, 1e4, 10.0), None, "auto"),
     "sticks": ([rd.effects.DryFriction(1.0, 1.2)], None, "auto"),
-    "sampled": ((), rd.control.PD(rd.control.hold(Q - 0.3), 40.0, 4.0, period_s=0.01), "auto"),
+    "sampled": ((), rd.control.PD(rd.control.hold(Q - 0.3), kp=40.0, kd=4.0, period_s=0.01), "auto"),
     "declared by a user": ([Declared(1.5)], None, "RK4"),
 }
 
@@ -422,7 +422,7 @@ def test_models_of_ones_own_controller_have_the_right_angles_of_the_machine_code
 
     options = {"duration_s": 0.5, "record_every_s": 0.01, "engine": "compiled", "estimate_error": False}
     run = rd.simulate(_Stiff.arm, _Stiff.start, controller=Law(_Stiff.plan, _Stiff.arm), **options)
-    built_in = rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd)
+    built_in = rd.control.PDGravity(_Stiff.arm, _Stiff.plan, kp=_Stiff.kp, kd=_Stiff.kd)
     same = rd.simulate(_Stiff.arm, _Stiff.start, controller=built_in, **options)
     assert run.statistics.engine == "compiled" and np.abs(run.q - same.q).max() < 1e-12
 
@@ -622,7 +622,7 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
     def law(t, q, v):
         return 4.0 * (Q - 0.2 - q) - 1.5 * v
 
-    pd = rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5)
+    pd = rd.control.PD(rd.control.hold(Q - 0.2), kp=4.0, kd=1.5)
     setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, pd, "RK4", engine="interpreted")
     run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, method="RK4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
@@ -656,7 +656,7 @@ def test_recorded_controller_states_obey_their_equation(
 ) -> None:
     """dz/dt = ki e without a limit; sampled, z⁺ = z + T ki e at each tick, exactly."""
     ki = 3.0
-    pid = rd.control.PID(rd.control.hold(Q - 0.2), 8.0, ki, 2.0, period_s=period_s)
+    pid = rd.control.PID(rd.control.hold(Q - 0.2), kp=8.0, ki=ki, kd=2.0, period_s=period_s)
     method = "GaussLegendre4" if canonical else "RK4"
     run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=pid, engine=engine, method=method)
     z, e = run.controller_states, Q - 0.2 - run.q

@@ -111,7 +111,7 @@ def test_lugre_friction_at_rest_is_a_spring(engine: str) -> None:
 
 def setup(engine: str, period: float = 0.0, **options) -> rd.Setup:
     effects = [rd.effects.ActuatorLag([0.05, 0.02]), FRICTION, rd.effects.EffortLimit(15.0)]
-    control = rd.control.PID(rd.control.quintic(Q, [0.6, -0.3], 0.3), 90.0, 60.0, 20.0, period_s=period)
+    control = rd.control.PID(rd.control.quintic(Q, [0.6, -0.3], 0.3), kp=90.0, ki=60.0, kd=20.0, period_s=period)
     return rd.Setup(
         rd.Plant(ARM, effects), Q, controller=control, record_every_s=0.01, estimate_error=False, engine=engine,
         **({"duration_s": 0.3, "method": "RK4", "step_s": 1e-3} | options),

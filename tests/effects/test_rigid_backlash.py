@@ -89,7 +89,7 @@ def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float)
 
 def arm_run(engine: str, effects: tuple = (), tolerance: float = 1e-11, period: float = 0.01) -> rd.Trajectory:
     drive = rd.effects.RigidBacklash([0.01, 0.02], [0.4, 0.05], [2.0, 4.0], [0.6, 0.3], viscous=0.2)
-    control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), [300.0, 90.0], [40.0, 9.0], period_s=period)
+    control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), kp=[300.0, 90.0], kd=[40.0, 9.0], period_s=period)
     return rd.simulate(
         rd.Plant(ARM, [drive, *effects]), Q, duration_s=0.8, controller=control, engine=engine, record_every_s=0.01,
         method=rd.integrate.Adaptive("DOP853", tolerance, tolerance / 100), estimate_error=False,
@@ -138,7 +138,7 @@ def test_without_loss_the_energy_of_arm_and_motors_is_kept() -> None:
 @BOTH
 def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     """From its impact without restitution on, the arm with n² J at its second joint, driven there; 1e-10."""
-    law = rd.control.PD(rd.control.hold([0.3, 2.5]), [200.0, 40.0], [30.0, 3.0])
+    law = rd.control.PD(rd.control.hold([0.3, 2.5]), kp=[200.0, 40.0], kd=[30.0, 3.0])
     options = {"method": TIGHT, "estimate_error": False, "controller": law, "engine": engine}
     drive = rd.effects.RigidBacklash({"joint_2": 0.01}, {"joint_2": 0.05}, {"joint_2": 4.0})
     run = rd.simulate(rd.Plant(ARM, [drive]), Q, duration_s=0.25, record_every_s=0.1, **options)

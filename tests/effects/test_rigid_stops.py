@@ -186,7 +186,7 @@ def test_stops_that_are_struck_in_turn_come_to_rest_together() -> None:
     """A cart and its pole driven into a corner: each impact kicks the other joint off its stop, ever less."""
     arm = rd.load("cart_pole")
     stops = rd.effects.RigidStops([-0.6556, 0.5434], [-0.0705, 0.9402], [0.6, 0.0])
-    drive = rd.control.PD(rd.control.hold([-0.7727, 0.6249]), [370.0, 4.3], [17.3, 1.14])
+    drive = rd.control.PD(rd.control.hold([-0.7727, 0.6249]), kp=[370.0, 4.3], kd=[17.3, 1.14])
     plant = rd.Plant(arm, [rd.effects.ViscousFriction([3.6, 0.52]), stops])
     loose = {"method": rd.integrate.Adaptive(rtol=1e-4, atol=1e-6), "estimate_error": False}
     run = rd.simulate(plant, [-0.5163, 0.7435], [0.6811, 0.9512], duration_s=1.0, controller=drive, **loose)
@@ -239,7 +239,7 @@ def test_impacts_that_another_joint_feeds_come_to_an_end() -> None:
     """Joint 2 is pressed on a stop without loss, joint 1 sticks and slides at each of its ever smaller bounces."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([5.355, 0.0], [6.356, 0.0]), rd.effects.ViscousFriction(0.1),
                            rd.effects.RigidStops([-0.2, -0.3], [0.6, 0.7], [0.5, 1.0])])  # fmt: skip
-    drive = rd.control.PD(rd.control.hold([0.322, -0.759]), [215.56, 19.219], [3.593, 0.32])
+    drive = rd.control.PD(rd.control.hold([0.322, -0.759]), kp=[215.56, 19.219], kd=[3.593, 0.32])
     run = rd.simulate(
         plant, [0.3, 0.4], [0.238, 1.792], duration_s=2.0, controller=drive, engine="compiled", estimate_error=False,
         method=rd.integrate.Adaptive(rtol=1e-9, atol=1e-9),

@@ -105,7 +105,7 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
     )
     run = rd.simulate(
         rd.Plant(ARM, [drive]), Q, [0.4, -0.6], duration_s=1.0,
-        controller=rd.control.PD(rd.control.hold(target), kp, kd),
+        controller=rd.control.PD(rd.control.hold(target), kp=kp, kd=kd),
         method=TIGHT, engine=engine, record_every_s=0.1, estimate_error=False,
     )  # fmt: skip
     x = np.array([exact.sol(t) for t in run.t])
@@ -119,7 +119,7 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
 @pytest.mark.long
 def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     """The distance from M + n² J falls as 1/k: tenfold for a tenfold stiffness, within a tenth."""
-    control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
+    control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), kp=100.0, kd=20.0)
     options = {
         "duration_s": 0.5, "method": rd.integrate.Adaptive("Rodas5P", 1e-10, 1e-12), "record_every_s": 0.5,
         "estimate_error": False, "controller": control,

@@ -14,7 +14,7 @@ from tests.effects.test_line_spring_damper import BETWEEN, TO_WORLD, TREE, state
 from tests.long import long
 
 PLAN = rd.control.quintic(Q, [0.6, -0.3], 0.3)
-PID = rd.control.PID(PLAN, 90.0, 60.0, 20.0)
+PID = rd.control.PID(PLAN, kp=90.0, ki=60.0, kd=20.0)
 STATES = [rd.effects.ActuatorLag([0.05, 0.02]), FRICTION, rd.effects.EffortLimit(15.0)]
 DRIVE = [
     rd.effects.EffortLimit(30.0), rd.effects.ActuatorLag(0.02),
@@ -31,7 +31,7 @@ ON_ARM, ON_TREE = (ARM, Q, None, 0.3, PID), (TREE, *state(), 0.05, None)
 
 
 def driven(period_s: float) -> tuple[Any, ...]:
-    return ARM, Q, [0.2, 0.1], 0.3, rd.control.PD(PLAN, 90.0, 15.0, period_s=period_s)
+    return ARM, Q, [0.2, 0.1], 0.3, rd.control.PD(PLAN, kp=90.0, kd=15.0, period_s=period_s)
 
 
 STIFFNESSES = {"series_elastic.stiffness": [[200.0, 0.0], [90.0, 0.0]]}

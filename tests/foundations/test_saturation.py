@@ -61,11 +61,13 @@ def test_a_lag_that_reaches_the_limit_behind_it(engine: str, period_s: float) ->
 def test_a_reference_that_jumps_passes_the_limit_at_its_break(engine: str) -> None:
     """From rest at 0 to 2 at t = 0.2: kp (2 − q) − kd v > U at once, and q = U t²/(2 m) until it is left."""
     there = rd.control.PiecewisePolynomial([0.0, 0.2, 1.0], [[[0.0]], [[2.0]]])
-    run = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 0.6, method=TIGHT, engine=engine)
+    run = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, kp=10.0, kd=4.0), 0.6, method=TIGHT, engine=engine)
     assert [each.name for each in run.events] == ["upper effort limit of slide reached"]
     assert run.events[0].t == pytest.approx(0.2, abs=np.spacing(0.2))
     assert run.q[-1, 0] == pytest.approx(1.5 / MASS * 0.4**2 / 2, rel=1e-12)
-    whole = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 3.0, method=TIGHT, engine=engine)
+    whole = slide(
+        [rd.effects.EffortLimit(1.5)], rd.control.PD(there, kp=10.0, kd=4.0), 3.0, method=TIGHT, engine=engine
+    )
     left = whole.events[1]
     assert left.name == "upper effort limit of slide left"
     assert 10.0 * (2.0 - left.q[0]) - 4.0 * left.v[0] == pytest.approx(1.5, abs=1e-13)
@@ -73,9 +75,9 @@ def test_a_reference_that_jumps_passes_the_limit_at_its_break(engine: str) -> No
 
 def control(kind: str) -> tuple[rd.control.Controller, list[rd.Effect]]:
     if kind == "pid":  # with back-calculation: ż has the torque that is cut away
-        gains = [120.0, 60.0], [300.0, 150.0], [20.0, 8.0]
-        return rd.control.PID(REFERENCE, *gains, effort_limit=LIMIT), []
-    return rd.control.ComputedTorque(ARM, REFERENCE, *rd.control.gains_from(1.0, 12.0)), [rd.effects.EffortLimit(LIMIT)]
+        gains = {"kp": [120.0, 60.0], "ki": [300.0, 150.0], "kd": [20.0, 8.0]}
+        return rd.control.PID(REFERENCE, **gains, effort_limit=LIMIT), []
+    return rd.control.ComputedTorque(ARM, REFERENCE, bandwidth_rad_s=12.0), [rd.effects.EffortLimit(LIMIT)]
 
 
 def saturated(kind: str, **options) -> rd.Trajectory:
@@ -114,7 +116,7 @@ def test_limits_that_are_not_reached_change_no_step() -> None:
 def test_what_is_held_between_ticks_is_not_cut(method: str) -> None:
     """The command is constant between ticks, and nothing switches there."""
     gains = rd.control.gains_from(1.0, 12.0)
-    sampled = rd.control.ComputedTorque(ARM, REFERENCE, *gains, period_s=0.01)
+    sampled = rd.control.ComputedTorque(ARM, REFERENCE, kp=gains[0], kd=gains[1], period_s=0.01)
     setup = rd.Setup(rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), START, controller=sampled, method=method)
     run = rd.simulate(setup, estimate_error=False)
     assert setup.finds_events is (method == "DOP853")

@@ -59,14 +59,14 @@ def values() -> dict[str, Any]:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([0.1, 0.2])])
     options: Any = {
         "duration_s": 0.05,
-        "controller": rd.control.PD(PLAN, 10.0, 1.0),
+        "controller": rd.control.PD(PLAN, kp=10.0, kd=1.0),
         "method": "RK4",
         "step_s": 0.01,
     }
     setup = rd.Setup(plant, Q, **options)
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], vary={"kp": [1.0, 2.0]})
     loop = rd.control.Loop(
-        rd.control.PD(PLAN, [1.0, 2.0], 1.0, 0.01),
+        rd.control.PD(PLAN, kp=[1.0, 2.0], kd=1.0, period_s=0.01),
         [rd.control.Noise([0.1, 0.2]), rd.control.Quantisation(0.1)],
         [rd.control.Differences(), rd.control.LowPass(9.0)],
         rd.control.RateLimit([1.0, 2.0]), 1.5,
@@ -76,10 +76,10 @@ def values() -> dict[str, Any]:
         rd.effects.Layer(0, 0.01, of_velocity=True),
         rd.integrate.Adaptive(), rd.accuracy.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM,
         rd.Lagrangian(ARM), plant,
-        rd.control.PD(PLAN, [1.0, 2.0], 1.0), rd.control.PID(PLAN, 1.0, 1.0, 1.0),
-        rd.control.PDGravity(ARM, PLAN, 1.0, 1.0),
-        rd.control.FeedForward(ARM, PLAN, 1.0, 1.0), rd.control.ComputedTorque(ARM, PLAN, 1.0, 1.0),
-        rd.control.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)),
+        rd.control.PD(PLAN, kp=[1.0, 2.0], kd=1.0), rd.control.PID(PLAN, kp=1.0, ki=1.0, kd=1.0),
+        rd.control.PDGravity(ARM, PLAN, kp=1.0, kd=1.0),
+        rd.control.FeedForward(ARM, PLAN, kp=1.0, kd=1.0), rd.control.ComputedTorque(ARM, PLAN, kp=1.0, kd=1.0),
+        rd.control.OperationalSpace(ARM, "tip", LINE, kp=1.0, kd=1.0, posture=Q, rows=(0, 2)),
         *map(example, EFFECTS), PLAN,
         rd.control.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
@@ -149,9 +149,9 @@ def test_values_keep_copies_of_what_they_are_given() -> None:
     x, points = np.array([0.3, 0.4]), np.ones((3, 2))
     times, about = np.array([0.0, 1.0, 2.0]), {"author": "me"}
     made: list[tuple[Any, tuple[str, ...]]] = [
-        (rd.control.PD(PLAN, x, x), ("kp", "kd")),
-        (rd.control.ComputedTorque(ARM, PLAN, x, x), ("kp", "kd")),
-        (rd.control.PID(PLAN, x, x, x, x), ("kp", "ki", "kd", "effort_limit")),
+        (rd.control.PD(PLAN, kp=x, kd=x), ("kp", "kd")),
+        (rd.control.ComputedTorque(ARM, PLAN, kp=x, kd=x), ("kp", "kd")),
+        (rd.control.PID(PLAN, kp=x, ki=x, kd=x, effort_limit=x), ("kp", "ki", "kd", "effort_limit")),
         (rd.control.Samples(times, points), ("breaks", "coefficients")),
         (rd.Setup(rd.Plant(ARM), x, x, about=about), ("q0", "v0", "about")),
     ]

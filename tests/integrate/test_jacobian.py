@@ -23,7 +23,7 @@ EFFECTS = (
     *rd.effects.joint_stops([-1.0, -0.6], [0.3, 1.0], 1e5, 1e4),  # both joints lie beyond one
 )
 LAW = rd.control.PID(
-    rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3, v1=[0.2, 0.4]), [20.0, 9.0], [4.0, 2.0], [3.0, 1.0]
+    rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3, v1=[0.2, 0.4]), kp=[20.0, 9.0], ki=[4.0, 2.0], kd=[3.0, 1.0]
 )
 STATE = np.array([0.4, -0.7, 0.13, -0.25, 0.02, -0.03, 0.5, -0.1, -0.2, -0.3])
 
@@ -107,7 +107,7 @@ def test_it_is_made_only_for_methods_that_need_it() -> None:
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
     """With parameters that differ from run to run, and to the last bits of one run alone."""
-    law = rd.control.PD(LAW.reference, LAW.kp, LAW.kd)
+    law = rd.control.PD(LAW.reference, kp=LAW.kp, kd=LAW.kd)
     made, lanes = setup(controller=law), 16
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))

@@ -228,7 +228,7 @@ def test_steps_are_not_bounded_by_stiff_damping(engine: str) -> None:
 
 def test_both_engines_make_the_same_steps() -> None:
     """To 4 κ u, of κ the condition of 1 − h γ J, where both have one Jacobian: stiff, with a moving reference."""
-    law = rd.control.PD(rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3), [2000.0, 900.0], [40.0, 20.0])
+    law = rd.control.PD(rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3), kp=[2000.0, 900.0], kd=[40.0, 20.0])
     plant, h = rd.Plant(ARM, [rd.effects.ViscousFriction([1e3, 1e4]), rd.effects.Spring(1e4)]), 0.01
     options: dict[str, Any] = {"controller": law, "method": "Rodas5PFixed", "step_s": h, "duration_s": h}
     setup, equation = rd.Setup(plant, **START, **options), StateEquation(plant, law)
@@ -265,7 +265,7 @@ def test_the_error_follows_the_tolerance() -> None:
 
 
 @pytest.mark.parametrize(
-    "segments", [{}, {"controller": rd.control.PD(rd.control.hold([0.2, 0.1]), [40.0, 20.0], 3.0, period_s=0.01)}]
+    "segments", [{}, {"controller": rd.control.PD(rd.control.hold([0.2, 0.1]), kp=[40.0, 20.0], kd=3.0, period_s=0.01)}]
 )
 def test_both_engines_choose_the_same_steps(segments: dict[str, Any]) -> None:
     """Though one has differences for its Jacobian: right to 1e-10, which the error of a step does not see."""

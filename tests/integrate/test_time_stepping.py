@@ -59,7 +59,7 @@ def test_a_sliding_block_stops_within_a_step_of_where_it_must(engine: str) -> No
 def test_the_actuation_of_every_step_is_seen_by_both_engines(period_s: float) -> None:
     """Its extremes are those of the samples at each tick, or at each step to O(h); machine code is as Python."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([0.5, 0.2]), rd.effects.ViscousFriction([0.1, 0.1])])
-    control = rd.control.PD(rd.control.hold([0.4, -0.2]), [30.0, 20.0], [3.0, 2.0], period_s=period_s)
+    control = rd.control.PD(rd.control.hold([0.4, -0.2]), kp=[30.0, 20.0], kd=[3.0, 2.0], period_s=period_s)
     runs = [
         rd.simulate(
             plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_every_s=0.0, controller=control,
@@ -170,7 +170,7 @@ def test_rollouts_are_the_runs_of_simulate(name: str, sampled: bool) -> None:
     """In both engines and in lanes, with equal events: they differ by rounding that the motion has magnified."""
     rng = np.random.default_rng(7)
     q, v = rng.uniform(-0.45, 0.45, (70, 2)), rng.normal(size=(70, 2))
-    control = rd.control.PID(rd.control.hold([0.2, -0.1]), 40.0, 20.0, 4.0, period_s=0.004 if sampled else 0.0)
+    control = rd.control.PID(rd.control.hold([0.2, -0.1]), kp=40.0, ki=20.0, kd=4.0, period_s=0.004 if sampled else 0.0)
     setup = rd.Setup(rd.Plant(ARM, HELD[name]), q[0], duration_s=0.6, controller=control, step_s=1e-3, **FIXED)
     many = rd.rollouts(setup, q, v, record=("q", "v", "u", "energy", "work"))
     for run in (0, 33, 69):
@@ -257,7 +257,7 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
 def test_a_run_far_beyond_its_stable_step_ends_as_diverged() -> None:
     """Positions of 1e16 rad and more, where M by Pinocchio is rounding and no longer positive definite."""
     robot, q = rd.load("panda"), np.full(8, 0.3)
-    law = rd.control.PDGravity(robot, rd.control.hold(q), 1e3, 50.0)
+    law = rd.control.PDGravity(robot, rd.control.hold(q), kp=1e3, kd=50.0)
     run = rd.simulate(
         robot, q + 1e-3, controller=law, duration_s=0.5, method="MoreauJean", step_s=0.01, engine="interpreted",
         estimate_error=False,

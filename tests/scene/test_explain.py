@@ -60,7 +60,7 @@ def test_the_model_of_a_controller_and_the_span_of_its_reference_are_named() -> 
     plan = rd.control.quintic(q, q + 0.4, duration_s=1.5, start_s=0.5)
 
     def explained(model: rd.Robot) -> Result:
-        controller = rd.control.ComputedTorque(model, plan, 100.0, 20.0)
+        controller = rd.control.ComputedTorque(model, plan, kp=100.0, kd=20.0)
         return rd.explain(rd.Setup(plant, q, duration_s=2.5, controller=controller))
 
     answer = explained(arm.with_(mass_scale=1.2))
@@ -96,8 +96,8 @@ def test_other_formulations_are_explained_alike() -> None:
 def test_plant_and_setup_show_their_equation() -> None:
     arm = rd.load("planar_2r")
     plant = rd.Plant(arm, [rd.effects.ViscousFriction([0.5, 0.2])])
-    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 9.0, 6.0, 0.01)
-    setup = rd.Setup(plant, [0.1, 0.2], duration_s=0.1, controller=rd.control.Loop(law, measurement_delay=1.0))
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=9.0, kd=6.0, period_s=0.01)
+    setup = rd.Setup(plant, [0.1, 0.2], duration_s=0.1, controller=rd.control.Loop(law, measurement_delay_periods=1.0))
     assert repr(plant).startswith("<Plant: planar_2r: 2 joints, joint_1, joint_2\n")
     assert repr(setup).startswith("<Setup: planar_2r: 2 joints, joint_1, joint_2\n")
     for value in (plant, setup):
@@ -106,4 +106,4 @@ def test_plant_and_setup_show_their_equation() -> None:
             assert line in repr(value) and line in page.text_content()
         assert "<script" not in value._repr_html_() and len(value._repr_html_()) < 5_000
     assert "u = kp (q_d − q) + kd (v_d − v)" in repr(setup) and "kp = 9 N m/rad" in repr(setup)
-    assert "measurement_delay = 1" in repr(setup)
+    assert "measurement_delay_periods = 1" in repr(setup)

@@ -101,7 +101,7 @@ WRITTEN = {  # kinds whose keys are not the coefficients of a class, and the pla
         lambda: rd.Plant(ARM.with_(armature=[0.002 * 81.0, 0.001])),
     ),
     "carried_payload": (
-        'frame = "tip"\nmass_kg = 0.5\nend_s = 0.07\npicked_up = "at_speed_of_link"',
+        'frame = "tip"\nmass_kg = 0.5\nend_s = 0.07\nat_rest = false',
         lambda: rd.Plant(ARM, [rd.effects.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]),
     ),
     "external_wrench": (
@@ -342,7 +342,7 @@ q = [0.5, 0.1]
 def by_hand() -> rd.control.Loop:
     q = rd.control.hold([0.5, 0.1])
     return rd.control.Loop(
-        rd.control.PD(q, 50.0, [5.0, 4.0], 0.004),
+        rd.control.PD(q, kp=50.0, kd=[5.0, 4.0], period_s=0.004),
         [rd.control.Noise(1e-3), rd.control.Quantisation([1e-4, 2e-4])],
         [rd.control.Differences(), rd.control.LowPass(300.0, 1)],
         [rd.control.LowPass(400.0), rd.control.Quantisation(0.01), rd.control.RateLimit(2000.0)], 1.0, 0.4, 5,
@@ -371,9 +371,7 @@ def test_explain_says_what_stands_in_the_loop_and_what_it_takes(write) -> None:
     ):
         assert line in said, line
     assert "of the control" not in said.partition("\ncontrol: ")[0]  # nothing is left out
-    said = run("explain", write(HEAD + LOOP.partition("measurement_delay")[0])).stdout
-    assert (
-        "of the control: measurement_delay, actuation_delay, noise, quantisation, low_pass, differences, rate_limit"
-        in said
-    )
+    said = run("explain", write(HEAD + LOOP.partition("measurement_delay_periods")[0])).stdout
+    delays, blocks = "measurement_delay_periods, actuation_delay_periods", "noise, quantisation, low_pass, differences"
+    assert f"of the control: {delays}, {blocks}, rate_limit" in said
     assert "machine code of a tick of the control: 8 instructions\n" in said

@@ -127,3 +127,51 @@ def test_a_name_of_a_file_is_told_escaped(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "urdf" / "pendulum.urdf").read_text(encoding="utf-8")
     (tmp_path / "arm.urdf").write_text(text.replace('name="pivot"', 'name="x\x9b\u202e"'), encoding="utf-8")
     assert refusal(["info", tmp_path / "arm.urdf"]).isprintable()
+
+
+CONTROLLED = '[control]\nkind = "{}"\nbandwidth_rad_s = 5.0\n'
+OF_EFFECTS = {  # an effect with a wrong value, and the keys at fault
+    'kind = "viscous_friction"': ("viscous_N_m_s_per_rad",),
+    'kind = "viscous_friction"\nviscous_N_m_s_per_rad = -1.0': ("viscous_N_m_s_per_rad",),
+    'kind = "viscous_friction"\nviscous_N_m_s_per_rad = {elbow = 1.0}': ("viscous_N_m_s_per_rad",),
+    'kind = "viscous_friction"\nviscous_N_m_s_per_rad = [1.0, 2.0, 3.0]': ("viscous_N_m_s_per_rad",),
+    'kind = "regularised_coulomb_friction"\ncoulomb_N_m = 1.0\nvelocity_scale_rad_s = 0.0': ("velocity_scale_rad_s",),
+    'kind = "dry_friction"\ncoulomb_N_m = 2.0\nstatic_N_m = 1.0': ("coulomb_N_m", "static_N_m"),
+    'kind = "dry_friction"\ncoulomb_N_m = 2.0\nstribeck_velocity_rad_s = 0.1': (
+        "stribeck_velocity_rad_s",
+        "static_N_m",
+    ),
+    'kind = "rigid_backlash"\nhalf_gap_rad = 0.0\ninertia_kg_m2 = 0.1': ("half_gap_rad",),
+    'kind = "rigid_stops"\nlower_rad = 1.0\nupper_rad = -1.0': ("lower_rad", "upper_rad"),
+    'kind = "joint_stops"\nlower_rad = 1.0\nupper_rad = -1.0': ("lower_rad", "upper_rad"),
+    'kind = "effort_limit"\nlimit_N_m = -1.0': ("limit_N_m",),
+    'kind = "armature"\ninertia_kg_m2 = -1.0': ("inertia_kg_m2",),
+    'kind = "payload"\nframe = "tip"\nmass_kg = 1.0\ninertia_kg_m2 = [[1, 2, 0], [0, 1, 0], [0, 0, 1]]': (
+        "inertia_kg_m2",
+    ),
+}
+OF_CONTROL = {
+    CONTROLLED.format("pid") + "effort_limit_N_m = -1.0": ("effort_limit_N_m",),
+    CONTROLLED.format("pd") + "damping_ratio = -1.0": ("damping_ratio",),
+    CONTROLLED.format("pd").replace("5.0", "-5.0"): ("bandwidth_rad_s",),
+    CONTROLLED.format("pd") + 'period_s = 0.01\n[[control.velocity]]\nkind = "noise"\ndeviation_rad_s = -1.0': (
+        "deviation_rad_s",
+    ),
+    CONTROLLED.format("pd") + 'period_s = 0.01\n[[control.velocity]]\nkind = "low_pass"\ncutoff_rad_s = 400.0': (
+        "cutoff_rad_s",
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("table", "keys"),
+    [("[[effect]]\n" + text, keys) for text, keys in OF_EFFECTS.items()] + list(OF_CONTROL.items()),
+)
+def test_errors_name_the_keys_of_the_file(table: str, keys: tuple[str, ...], tmp_path: Path) -> None:
+    """Not the arguments of the Python class, whose names lack the unit."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text('robot = "planar_2r"\nduration_s = 0.1\n' + table, encoding="utf-8")
+    with pytest.raises(SceneError) as error:
+        rd.read_scene(scene)
+    for key in keys:
+        assert re.search(rf"\b{key}\b", str(error.value)), str(error.value)

@@ -96,7 +96,7 @@ def test_stiff_and_sampled_runs_are_made_by_their_methods() -> None:
     stiff = rd.simulate(rd.Plant(ARM, [rd.effects.ViscousFriction(1e5)]), START, duration_s=1.0, accuracy=1e-6)
     assert stiff.statistics.method == "Rodas5P"
     assert stiff.statistics.steps < 200
-    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 30.0, 8.0, period_s=0.005)
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), kp=30.0, kd=8.0, period_s=0.005)
     sampled = rd.simulate(ARM, START, duration_s=0.5, controller=law, accuracy=1e-6)
     assert sampled.statistics.method == "RK4"
     assert sampled.statistics.steps == 100  # one in each period
@@ -121,7 +121,7 @@ def test_the_best_that_is_named_can_be_had() -> None:
 
 def test_a_run_that_diverges_says_so() -> None:
     """No accuracy is claimed of it."""
-    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 1e6, 1.0, period_s=0.05)
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), kp=1e6, kd=1.0, period_s=0.05)
     run = rd.simulate(ARM, START, duration_s=5.0, controller=law, accuracy=1e-3)
     assert run.outcome.ending == "diverged"
     assert run.accuracy is None

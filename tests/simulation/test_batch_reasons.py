@@ -26,7 +26,7 @@ def reasons_of(runs: rd.Rollouts) -> list[Reason]:
 @pytest.mark.parametrize("period", [0.0, 0.004], ids=["continuous", "sampled"])
 def test_gains_of_an_arm_from_stable_to_unstable_give_the_reasons_of_single_runs(period: float) -> None:
     arm, q0 = rd.load("ur5"), np.full(6, 0.3)
-    law = rd.control.PD(rd.control.hold(q0 + 0.2), 1.0, 0.05, period)
+    law = rd.control.PD(rd.control.hold(q0 + 0.2), kp=1.0, kd=0.05, period_s=period)
     setup = rd.Setup(rd.Plant(arm), q0, duration_s=1.0, controller=law, method="RK4", step_s=2e-3)
     factors = np.geomspace(1.0, 1e5, 6)
     runs = rd.rollouts(setup, vary={"kp": factors, "kd": 0.05 * factors})
@@ -40,7 +40,7 @@ def test_steps_just_above_the_longest_stable_one_are_the_reason() -> None:
     """v̇ = −(kd/I) v: RK4 is stable up to h = 2.785 I/kd."""
     joint, step = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0)), 0.01
     parts = np.array([0.9, 0.97, 1.03])
-    law = rd.control.PD(rd.control.hold([0.0]), 0.0, 1.0)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=0.0, kd=1.0)
     setup = rd.Setup(rd.Plant(joint), [0.1], [1.0], duration_s=5000 * step, controller=law, method="RK4", step_s=step)
     runs = rd.rollouts(setup, vary={"kd": STABLE * INERTIA / step * parts})
     assert reasons_of(runs) == [Reason.END, Reason.END, Reason.STEP_TOO_LONG]
@@ -51,7 +51,7 @@ def test_steps_just_above_the_longest_stable_one_are_the_reason() -> None:
 @pytest.mark.parametrize("engine", ["auto", "interpreted"])
 def test_a_run_thrown_out_of_a_stiff_spring_is_implausibly_fast(engine: str) -> None:
     """A spring of 1e12 N m/rad that the steps do not resolve: energy from nowhere, at 1e4 rad/s and more."""
-    arm, law = rd.load("planar_2r"), rd.control.PD(rd.control.hold([0.0, 0.0]), 40.0, 4.0)
+    arm, law = rd.load("planar_2r"), rd.control.PD(rd.control.hold([0.0, 0.0]), kp=40.0, kd=4.0)
     stops = rd.effects.joint_stops([-1.0, -1.0], [0.5, 1.0], 1e12)
     plant = rd.Plant(arm, [rd.effects.EffortLimit(30.0), *stops])
     setup = rd.Setup(plant, [0.4, -0.7], [3.0, 5.0], 0.2, law, "RK4", 2e-3)
@@ -62,7 +62,7 @@ def test_a_run_thrown_out_of_a_stiff_spring_is_implausibly_fast(engine: str) -> 
 def test_the_reason_of_a_run_does_not_depend_on_its_neighbours(tmp_path) -> None:
     """Of many that diverge each is judged; files keep reason and numbers."""
     arm, q0 = rd.load("planar_2r"), [0.4, -0.7]
-    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 10.0, 1.0, 0.01)
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), kp=10.0, kd=1.0, period_s=0.01)
     setup = rd.Setup(rd.Plant(arm), q0, duration_s=3.0, controller=law, method="RK4", step_s=0.01)
     kd = np.full(70, 200.0)
     runs, alone = rd.rollouts(setup, vary={"kd": kd}), rd.rollouts(setup, vary={"kd": kd[:1]})

@@ -52,7 +52,7 @@ def test_causes_add_up_to_the_actuation(name: str, engine: str) -> None:
     """To rounding, at all samples: those of joints that stick, strike and break away too."""
     plant = plants()[name]
     n = plant.dynamics.n
-    hold = rd.control.PD(rd.control.hold([0.5] * n), 20.0, 2.0)
+    hold = rd.control.PD(rd.control.hold([0.5] * n), kp=20.0, kd=2.0)
     start = np.linspace(0.3, 0.4, n), np.linspace(1.0, -0.6, n)
     run = rd.simulate(plant, *start, duration_s=0.4, controller=hold, engine=engine, estimate_error=False)
     split = run.causes()

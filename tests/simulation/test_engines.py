@@ -30,13 +30,13 @@ Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
 REFERENCE = rd.control.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")
 CONTROLLERS = {
     "none": None,
-    "PD": rd.control.PD(rd.control.hold(Q), 40.0, [4.0, 3.0]),
-    "PD, sampled": rd.control.PD(REFERENCE, 40.0, 4.0, period_s=0.01),
-    "PID": rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0),
-    "PID, sampled": rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=[3.0, np.inf], period_s=0.004),
-    "PD and gravity": rd.control.PDGravity(ARM, REFERENCE, 40.0, 4.0),
-    "feed forward": rd.control.FeedForward(ARM, REFERENCE, 40.0, 4.0),
-    "computed torque": rd.control.ComputedTorque(ARM.with_(gravity=(0.0, 0.0, -9.0)), REFERENCE, 40.0, 9.0),
+    "PD": rd.control.PD(rd.control.hold(Q), kp=40.0, kd=[4.0, 3.0]),
+    "PD, sampled": rd.control.PD(REFERENCE, kp=40.0, kd=4.0, period_s=0.01),
+    "PID": rd.control.PID(REFERENCE, kp=40.0, ki=30.0, kd=4.0, effort_limit=3.0),
+    "PID, sampled": rd.control.PID(REFERENCE, kp=40.0, ki=30.0, kd=4.0, effort_limit=[3.0, np.inf], period_s=0.004),
+    "PD and gravity": rd.control.PDGravity(ARM, REFERENCE, kp=40.0, kd=4.0),
+    "feed forward": rd.control.FeedForward(ARM, REFERENCE, kp=40.0, kd=4.0),
+    "computed torque": rd.control.ComputedTorque(ARM.with_(gravity=(0.0, 0.0, -9.0)), REFERENCE, kp=40.0, kd=9.0),
 }
 LINK = ARM.frame_names[-1]
 EFFECTS = {
@@ -117,7 +117,7 @@ def test_six_joints_under_all_at_once(method: str) -> None:
         rd.effects.EffortLimit("urdf"),
         rd.effects.ExternalWrench("tool0", [5, 3, 1, 0.1, 0.2, 0.3]),
     ]
-    controller = rd.control.ComputedTorque(UR5, rd.control.quintic(q, q + 0.4, 0.1), 100.0, 20.0)
+    controller = rd.control.ComputedTorque(UR5, rd.control.quintic(q, q + 0.4, 0.1), kp=100.0, kd=20.0)
     options = {"q0": q, "v0": 0 * q, "robot": UR5, "effects": effects, "controller": controller, "duration_s": 0.12}
     check_equal(*both(method=rd.integrate.method(method), **options), 1e-11)
 
@@ -137,18 +137,20 @@ def test_a_method_in_python_takes_the_rate_in_machine_code() -> None:
 
 
 DIVERGING = {
-    "a number overflows": {"controller": rd.control.PD(rd.control.hold(Q), 1e9, 1e7)},
+    "a number overflows": {"controller": rd.control.PD(rd.control.hold(Q), kp=1e9, kd=1e7)},
     "energy grows": {
-        "controller": rd.control.PD(rd.control.hold(Q), 3e4, 0.0),
+        "controller": rd.control.PD(rd.control.hold(Q), kp=3e4, kd=0.0),
         "method": "RK4",
         "step_s": 0.05,
         "duration_s": 20.0,
     },
     "stages are not found": {
-        "controller": rd.control.PD(rd.control.hold(Q), 1e7, 0.0),
+        "controller": rd.control.PD(rd.control.hold(Q), kp=1e7, kd=0.0),
         "method": rd.integrate.method("GaussLegendre2"),
     },
-    "a tick asks for no finite torque": {"controller": rd.control.PD(rd.control.hold(Q), 1e9, 1e7, period_s=0.01)},
+    "a tick asks for no finite torque": {
+        "controller": rd.control.PD(rd.control.hold(Q), kp=1e9, kd=1e7, period_s=0.01)
+    },
 }
 
 
@@ -181,7 +183,7 @@ def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
 def test_a_reference_that_jumps_between_rests() -> None:
     """Steps end at the jump, so that both engines see the same constant on either side."""
     jump = rd.control.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
-    law = rd.control.PD(jump, 10.0, 1.0)
+    law = rd.control.PD(jump, kp=10.0, kd=1.0)
     setup = rd.Setup(rd.Plant(ARM), Q, None, 0.2, law, "RK4", estimate_error=False)
     run = rd.simulate(setup, engine="interpreted")
     assert np.abs(run.q[-1] - Q).max() > 0.01

@@ -33,7 +33,7 @@ SCENES = {
     ),
     "panda, free swing": (rd.Plant(PANDA), None, READY, np.zeros(7), 1.0, 2e-3),
     "panda, computed torque": (
-        rd.Plant(PANDA), rd.control.ComputedTorque(PANDA, REACH, *rd.control.gains_from(1.0, 8.0, 0.9)),
+        rd.Plant(PANDA), rd.control.ComputedTorque(PANDA, REACH, bandwidth_rad_s=8.0, damping_ratio=0.9),
         READY + 0.1, np.full(7, -0.2), 0.5, 5e-3,
     ),
     "cart_pole with spring": (
@@ -77,7 +77,7 @@ def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     assert f"{estimate.largest:.1e}" in run.summary
 
 
-SAMPLED = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
+SAMPLED = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.5), kp=[60.0, 20.0], kd=[4.0, 1.0], period_s=0.05)
 
 
 @pytest.mark.parametrize(

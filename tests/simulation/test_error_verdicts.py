@@ -260,7 +260,7 @@ def test_switches_closer_than_floats_can_tell_are_refused() -> None:
 def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
     """3 · 0.1 is not 0.3: one end of a segment, at the switch, and the controller acts there."""
     push = rd.effects.ExternalWrench("block", np.ones(6), start_s=0.3, end_s=0.7)
-    law = rd.control.PD(rd.control.hold([0.0]), 1.0, 1.0, period_s=0.1)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=1.0, kd=1.0, period_s=0.1)
     segments = rd.Setup(rd.Plant(RAIL, [push]), [0.1], duration_s=1.0, controller=law).segments
     starts = [each.start for each in segments]
     assert len(starts) == 10
@@ -271,7 +271,8 @@ def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
 
 def test_control_at_the_default_step_is_estimated() -> None:
     """1 kHz control has one step a tick: only shorter steps can tell, and they do."""
-    law = rd.control.PD(rd.control.hold(READY), *rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0), period_s=1e-3)
+    kp, kd = rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0)
+    law = rd.control.PD(rd.control.hold(READY), kp=kp, kd=kd, period_s=1e-3)
     setup = rd.Setup(rd.Plant(PANDA), READY + 0.1, duration_s=0.1, controller=law, method="Midpoint")
     run = rd.simulate(setup)
     error = np.abs(run.q - truth(setup, run.t)).max()
@@ -293,9 +294,8 @@ def test_one_short_segment_leaves_the_estimate_of_the_others() -> None:
 def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
     """RK4 is near its stability limit, so that no order shows; the run is right to 1e-6 all the same."""
     plant = rd.Plant(PANDA, "urdf")
-    law = rd.control.PDGravity(
-        PANDA, rd.control.quintic(READY, READY + 0.2, 0.2), *rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0)
-    )
+    kp, kd = rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0)
+    law = rd.control.PDGravity(PANDA, rd.control.quintic(READY, READY + 0.2, 0.2), kp=kp, kd=kd)
     run = rd.simulate(plant, q0=READY, duration_s=0.2, controller=law, method="RK4", step_s=2.5e-4, record_every_s=1e-3)
     tight = rd.simulate(
         plant, q0=READY, duration_s=0.2, controller=law, method=rd.integrate.Adaptive(rtol=1e-12, atol=1e-13),

@@ -25,7 +25,9 @@ PACKAGES = {"parquet": "pyarrow", "nc": "xarray", "mcap": "mcap_ros2"}
 def tame() -> rd.Trajectory:
     goal = rd.control.quintic([0.1, 0.3], [0.4, -0.2], 0.5)
     plant = rd.Plant(rd.load("cart_pole"), [rd.effects.ViscousFriction([0.4, 0.05])])
-    return rd.simulate(plant, [0.11, 0.32], [0.2, -0.4], duration_s=0.1, controller=rd.control.PD(goal, 90.0, 9.0))
+    return rd.simulate(
+        plant, [0.11, 0.32], [0.2, -0.4], duration_s=0.1, controller=rd.control.PD(goal, kp=90.0, kd=9.0)
+    )
 
 
 @pytest.fixture(scope="module")

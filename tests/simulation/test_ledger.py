@@ -18,8 +18,8 @@ FORCE = [3.0, -0.7, -2.0, 0.3, 4.0, 0.5]
 FRICTION, SPRING = rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([8.0, 5.0], [0.2, -0.3])
 DRY = rd.effects.RegularisedCoulombFriction([0.5, 0.2], 0.5)  # smooth on the scale of a step
 WINDOW = rd.effects.ExternalWrench("tip", FORCE, start_s=0.12, end_s=0.24)
-PD = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.3), [60.0, 20.0], [4.0, 1.0])
-SAMPLED = rd.control.PD(PD.reference, PD.kp, PD.kd, period_s=0.02)
+PD = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.3), kp=[60.0, 20.0], kd=[4.0, 1.0])
+SAMPLED = rd.control.PD(PD.reference, kp=PD.kp, kd=PD.kd, period_s=0.02)
 START = {"q0": [0.4, -0.7], "v0": [0.9, -0.5], "duration_s": 0.4}
 
 SCENES = {
@@ -245,7 +245,7 @@ def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_clos
 def test_rounding_at_rest_is_no_leak() -> None:
     """Held by gravity compensation, K is 1e-30 J and the residual 1e-14 J of potentials of 10 J: rounding of these."""
     arm, q = rd.load("ur5"), [0.3, -0.6, 0.4, -1.2, 0.5, 1.1]
-    run = rd.simulate(arm, q, duration_s=0.1, controller=rd.control.PDGravity(arm, rd.control.hold(q), 10.0, 1.0))
+    run = rd.simulate(arm, q, duration_s=0.1, controller=rd.control.PDGravity(arm, rd.control.hold(q), kp=10.0, kd=1.0))
     assert run.ledger.closure > 1e-3
     assert run.leak == ""
     assert "does not close" not in run.summary
@@ -254,7 +254,9 @@ def test_rounding_at_rest_is_no_leak() -> None:
 def test_an_arm_that_stands_exchanges_no_energy() -> None:
     """Held by its own weight's torque: what is left of power is rounding, and no part of it is stated."""
     q = np.array([0.4, -0.7])
-    held = rd.simulate(DOUBLE, q, duration_s=0.2, controller=rd.control.PDGravity(DOUBLE, rd.control.hold(q), 9, 3))
+    held = rd.simulate(
+        DOUBLE, q, duration_s=0.2, controller=rd.control.PDGravity(DOUBLE, rd.control.hold(q), kp=9, kd=3)
+    )
     assert not held.ledger.exchanges
     assert "J, no energy exchanged" in held.summary
     moved = rd.simulate(rd.Plant(DOUBLE), q, [1e-3, 0.0], duration_s=0.2)

@@ -73,7 +73,7 @@ def test_gravity_compensated_pd_has_the_eigenvalues_of_its_gains() -> None:
     """Then M ë + kd ė + kp e = 0 near rest, and the eigenvalues are the roots of det(s² M + s kd + kp)."""
     n, q, zero = 7, np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2]), np.zeros(7)
     kp, kd = np.linspace(900.0, 100.0, n), np.linspace(60.0, 9.0, n)
-    law = rd.control.PDGravity(PANDA, rd.control.hold(q), kp, kd)
+    law = rd.control.PDGravity(PANDA, rd.control.hold(q), kp=kp, kd=kd)
     A, B = rd.linearise(rd.Plant(PANDA), q, zero, law.torque(0.0, q, zero, np.zeros(0)))
     h = 1e-5
     feedback = np.zeros((n, 2 * n))
@@ -106,7 +106,7 @@ def test_a_small_deviation_moves_as_the_linearisation_says(size: float) -> None:
     plant, u = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])]), DOUBLE.N(q)
     away = size * np.array([0.6, -1.0, 0.8, 0.3])
     A, _ = rd.linearise(plant, q, np.zeros(2), u)
-    held = rd.control.FeedForward(DOUBLE, rd.control.hold(q), 0.0, 0.0)  # N(q) at the reference: constant
+    held = rd.control.FeedForward(DOUBLE, rd.control.hold(q), kp=0.0, kd=0.0)  # N(q) at the reference: constant
     run = rd.simulate(plant, q0=q + away[:2], v0=away[2:], duration_s=0.3, controller=held, estimate_error=False)
     np.testing.assert_allclose(run.u, np.tile(u, (len(run.t), 1)), rtol=1e-12)
     moved = np.concatenate([run.q[-1] - q, run.v[-1]])
@@ -262,7 +262,7 @@ def test_a_small_deviation_with_states_moves_as_the_linearisation_says(effects) 
     K[:, :2], K[:, 2:4] = 20.0 * np.eye(2), 3.0 * np.eye(2)
     start = np.concatenate([away, plant.equation_of_motion.start(q + away[:2], away[2:])])
     run = rd.simulate(
-        plant, q + away[:2], v0=away[2:], duration_s=0.3, controller=rd.control.PD(rd.control.hold(q), 20.0, 3.0),
+        plant, q + away[:2], v0=away[2:], duration_s=0.3, controller=rd.control.PD(rd.control.hold(q), kp=20.0, kd=3.0),
         method=rd.integrate.Adaptive(rtol=1e-10, atol=1e-13), estimate_error=False,
     )  # fmt: skip
     moved = np.concatenate([run.q[-1] - q, run.v[-1], *(states[-1] for states in (run.effect_states or {}).values())])

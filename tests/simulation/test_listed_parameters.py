@@ -19,7 +19,9 @@ from tests.long import long
 def setup() -> rd.Setup:
     arm = rd.load("cart_pole").with_(payload=rd.Payload("pole", 0.3, (0.0, 0.0, 0.1)))
     effects = [*rd.Plant(arm, "urdf").effects, rd.effects.Spring(2.0), rd.effects.Spring([1.0, 0.0], 0.1)]
-    law = rd.control.PDGravity(arm.with_(mass_scale=1.2), rd.control.hold([0.1, 0.2]), 9.0, [6.0, 2.0], 0.01)
+    law = rd.control.PDGravity(
+        arm.with_(mass_scale=1.2), rd.control.hold([0.1, 0.2]), kp=9.0, kd=[6.0, 2.0], period_s=0.01
+    )
     loop = rd.control.Loop(law, position=(rd.control.Quantisation(1e-3),))
     return rd.Setup(rd.Plant(arm, effects), [0.2, 0.3], duration_s=0.03, controller=loop, method="RK4")
 

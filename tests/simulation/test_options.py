@@ -18,8 +18,8 @@ ARM = rd.load("planar_2r")
 PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
 Q, V = np.array([0.3, -0.4]), np.array([0.2, 0.5])
 OPTIONS: dict[str, Any] = {
-    "duration_s": 0.05, "controller": rd.control.PD(rd.control.hold([0.1, 0.2]), [20.0, 9.0], 2.0), "method": "RK4",
-    "step_s": 2e-3, "record_every_s": 0.01, "about": {"author": "me"},
+    "duration_s": 0.05, "controller": rd.control.PD(rd.control.hold([0.1, 0.2]), kp=[20.0, 9.0], kd=2.0),
+    "method": "RK4", "step_s": 2e-3, "record_every_s": 0.01, "about": {"author": "me"},
 }  # fmt: skip
 
 

@@ -38,8 +38,8 @@ def setup(x: float, kind: str = "computed torque") -> rd.Setup:
     reference = rd.control.quintic(Q + x / 10, Q + 0.3, 0.2)
     model = loaded(0.8 + x, (0.01, 0.02, 0.01 + x))
     controllers = {
-        "computed torque": rd.control.ComputedTorque(model, reference, 60.0 + x, [9.0, 8.0 + x]),
-        "PID": rd.control.PID(reference, 60.0 + x, 20.0 + x, 9.0, effort_limit=25.0 + x, period_s=0.01),
+        "computed torque": rd.control.ComputedTorque(model, reference, kp=60.0 + x, kd=[9.0, 8.0 + x]),
+        "PID": rd.control.PID(reference, kp=60.0 + x, ki=20.0 + x, kd=9.0, effort_limit=25.0 + x, period_s=0.01),
     }
     plant, steps = rd.Plant(arm, effects), ("RK4", 1e-3, 0.01, False)
     return rd.Setup(plant, Q, V, 0.2, controllers[kind], *steps, engine="compiled")
@@ -200,9 +200,9 @@ def test_a_reference_of_a_users_own_is_not_taken_for_its_polynomial() -> None:
     """Its own `at` would be lost in machine code; "auto" runs it interpreted."""
     path = rd.control.quintic(Q, Q + 0.2, 0.1)
     shaken = Shaken(path.breaks, path.coefficients)
-    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.control.PD(path, 40.0, 4.0), "RK4", estimate_error=False)
+    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.control.PD(path, kp=40.0, kd=4.0), "RK4", estimate_error=False)
     rd.simulate(base, engine="compiled")
-    own = replace(base, controller=rd.control.PD(shaken, 40.0, 4.0))
+    own = replace(base, controller=rd.control.PD(shaken, kp=40.0, kd=4.0))
     assert rd.simulate(own).statistics.engine.startswith("interpreted (Shaken declares no knots")
     with pytest.raises(TraceError, match=r"Shaken cannot be compiled: its at\(t\) differs from its polynomials"):
         rd.simulate(own, engine="compiled")
@@ -221,7 +221,7 @@ def test_operational_space_is_compiled(turn: str) -> None:
     end = R @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     turns = {"free": {}, "kept": {"rotation": R}, "turning": {"rotation": R, "rotation_end": end}}
     control = rd.control.OperationalSpace(
-        UR5, "tool0", rd.control.line(p, p + np.array([0.1, 0.05, -0.1]), 0.2, **turns[turn]), 100.0, 20.0
+        UR5, "tool0", rd.control.line(p, p + np.array([0.1, 0.05, -0.1]), 0.2, **turns[turn]), kp=100.0, kd=20.0
     )
     base = rd.Setup(rd.Plant(UR5), START, None, 0.2, control, "RK4", 2e-3, estimate_error=False)
     ours, theirs = rd.simulate(base, engine="compiled"), rd.simulate(base, engine="interpreted")

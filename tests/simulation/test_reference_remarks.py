@@ -20,7 +20,7 @@ START, END = POINTS[0], [0.9, 0.3]
 def found(
     kind: RemarkKind, reference: Any, v0: Any = None, plant: rd.Plant = PLANT, kp: Any = 20.0
 ) -> tuple[Remark, ...]:
-    law = rd.control.PD(reference, kp, 3.0)
+    law = rd.control.PD(reference, kp=kp, kd=3.0)
     run = rd.simulate(plant, START, v0, duration_s=0.8, controller=law, estimate_error=False, engine="interpreted")
     return tuple(each for each in run.remarks if each.kind is kind)
 
@@ -29,7 +29,7 @@ def test_way_points_as_samples_jump_in_velocity() -> None:
     """Through five points goes one polynomial of degree 4, whose slope at the start is known."""
     slope = np.array([np.polyder(np.polyfit(TIMES, column, 4))[-1] for column in POINTS.T])
     remarks = found(RemarkKind.JUMPS, rd.control.Samples(TIMES, POINTS))
-    assert [(each.joint, each.quantity, each.at, each.limit) for each in remarks] == [("joint_1", "v", 0.0, 0.0)]
+    assert [(each.joint, each.quantity, each.at_s, each.limit) for each in remarks] == [("joint_1", "v", 0.0, 0.0)]
     assert remarks[0].value == pytest.approx(slope[0], rel=1e-9) and abs(slope[0]) > 2.5
     assert "joint_1 from 0 to 2.9" in remarks[0].text and "rd.control.via_points" in remarks[0].remedy
 
@@ -57,7 +57,7 @@ def test_a_reference_that_begins_otherwise_than_the_joint_is_remarked(reference,
     said = found(RemarkKind.JUMPS, reference, v0)
     assert [(each.joint, each.quantity) for each in said] == [each[:2] for each in jumps]
     for each, expected in zip(said, jumps, strict=True):
-        assert (each.at, each.value, each.limit) == pytest.approx(expected[2:], abs=1e-12)
+        assert (each.at_s, each.value, each.limit) == pytest.approx(expected[2:], abs=1e-12)
 
 
 @pytest.mark.parametrize(("stiffness", "holds"), [(9.0, True), (11.0, False)])
@@ -68,7 +68,7 @@ def test_a_joint_that_friction_holds_throughout_is_remarked(stiffness: float, ho
     """
     still = ARM.with_(gravity=(0.0, 0.0, 0.0), lock={"joint_1": 0.3})
     plant, q0 = rd.Plant(still, [rd.effects.DryFriction(5.0)]), np.array([-0.2])
-    law = rd.control.PD(rd.control.quintic(q0, [0.3], 0.4), stiffness, 0.0)
+    law = rd.control.PD(rd.control.quintic(q0, [0.3], 0.4), kp=stiffness, kd=0.0)
     run = rd.simulate(plant, q0, duration_s=0.8, controller=law, estimate_error=False, engine="interpreted")
     assert (np.ptp(run.q) == 0) == holds
     said = [each for each in run.remarks if each.kind is RemarkKind.HELD]
@@ -81,7 +81,7 @@ def test_a_joint_that_friction_holds_throughout_is_remarked(stiffness: float, ho
 def test_a_batch_tells_in_which_runs_a_joint_is_held_or_the_reference_jumps() -> None:
     """Each run as `simulate` does: held up to kp = 10 N m/rad, as above; from elsewhere the reference jumps."""
     still = ARM.with_(gravity=(0.0, 0.0, 0.0), lock={"joint_1": 0.3})
-    law = rd.control.PD(rd.control.quintic([-0.2], [0.3], 0.4), 9.0, 0.0)
+    law = rd.control.PD(rd.control.quintic([-0.2], [0.3], 0.4), kp=9.0, kd=0.0)
     setup = rd.Setup(rd.Plant(still, [rd.effects.DryFriction(5.0)]), [-0.2], duration_s=0.6, controller=law)
     starts, stiffness = np.array([[-0.2], [-0.2], [-0.1], [-0.35]]), np.array([9.0, 14.0, 9.5, 8.0])
     runs = rd.rollouts(setup, starts, vary={"kp": stiffness}, engine="interpreted")
@@ -105,7 +105,7 @@ def test_the_summary_says_how_often_the_estimate_calls_code_of_the_user() -> Non
     for name, control, estimate in (
         ("bare", law, False),
         ("law", law, True),
-        ("PD", rd.control.PD(rd.control.hold(END), 20, 3), True),
+        ("PD", rd.control.PD(rd.control.hold(END), kp=20, kd=3), True),
     ):
         calls[0] = 0
         run = rd.simulate(PLANT, START, duration_s=0.05, controller=control, estimate_error=estimate)

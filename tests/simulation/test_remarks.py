@@ -53,8 +53,8 @@ def test_sampled_damping_chatters_above_two(joint, ratio: float, integrator, cha
     if chatters:
         (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.CHATTER)
         # from ~1 % of the limit to it, amplitudes grow by 1.2 a tick: some 25 ticks
-        assert said.start < 0.05
-        assert said.start + said.duration == pytest.approx(0.5 - PERIOD, abs=2 * PERIOD)
+        assert said.start_s < 0.05
+        assert said.start_s + said.duration_s == pytest.approx(0.5 - PERIOD, abs=2 * PERIOD)
         assert said.value == pytest.approx(LIMIT, rel=1e-12)
         assert "kd period_s / M is 2.2" in said.remedy
         np.testing.assert_array_equal(run.extremes[2, :, 0], [-LIMIT, LIMIT])
@@ -80,7 +80,7 @@ def test_extremes_are_those_of_all_steps(method: str) -> None:
     """A run that keeps every step shows them: least and largest of q and v over its samples, to the bit."""
     arm = rd.load("ur5")
     q0, v0 = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4]), np.array([0.5, 0.4, -0.3, 0.2, 0.6, -0.5])
-    plant, law = rd.Plant(arm, [rd.effects.ViscousFriction(2.0)]), rd.control.PD(rd.control.hold(q0), 50.0, 5.0)
+    plant, law = rd.Plant(arm, [rd.effects.ViscousFriction(2.0)]), rd.control.PD(rd.control.hold(q0), kp=50.0, kd=5.0)
     setup = rd.Setup(plant, q0, v0, 0.05, law, method, estimate_error=False)
     every, few = rd.simulate(setup), rd.simulate(setup, record_every_s=0.05)
     np.testing.assert_array_equal(every.extremes, few.extremes)
@@ -105,30 +105,30 @@ def test_machine_code_shows_what_the_interpreted_loop_shows(joint, monkeypatch) 
     monkeypatch.undo()
     many = rd.simulate(damped(joint, 2.2, duration_s=1.5), engine="interpreted")
     assert kinds(few) == kinds(many)
-    assert few.remarks[0].duration == pytest.approx(many.remarks[0].duration)
-    assert few.remarks[0].start == many.remarks[0].start
+    assert few.remarks[0].duration_s == pytest.approx(many.remarks[0].duration_s)
+    assert few.remarks[0].start_s == many.remarks[0].start_s
 
 
 def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     """The limit L acts while kp (e − L t²/2M) − kd L t/M > L: the positive root of a quadratic, to a step of 1 ms."""
     kp, kd, e = 20.0, 10.0, 1.0
     a = LIMIT / INERTIA
-    control = rd.control.PD(rd.control.hold([e]), kp, kd)
+    control = rd.control.PD(rd.control.hold([e]), kp=kp, kd=kd)
     setup = rd.Setup(
         rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, method="RK4"
     )
     run = rd.simulate(setup, record_every_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
     (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.EFFORT_REACHED)
-    assert (said.start, said.value) == (0.0, LIMIT)
-    assert said.duration == pytest.approx(root, abs=1.5e-3)
+    assert (said.start_s, said.value) == (0.0, LIMIT)
+    assert said.duration_s == pytest.approx(root, abs=1.5e-3)
 
 
 @pytest.fixture(scope="module")
 def cart():
     """A cart pushed beyond 2 m, 5 m/s and 100 N, the limits of its file, with a sample at both ends only."""
     plan = rd.control.quintic(np.zeros(2), np.array([2.5, 0.0]), 0.8)
-    plant, law = rd.Plant(rd.load("cart_pole")), rd.control.PD(plan, 4e3, 400.0)
+    plant, law = rd.Plant(rd.load("cart_pole")), rd.control.PD(plan, kp=4e3, kd=400.0)
     return rd.Setup(plant, np.zeros(2), None, 1.0, law, "RK4", record_every_s=1.0, estimate_error=False)
 
 
@@ -141,9 +141,9 @@ def test_what_passes_the_limits_of_the_file_is_said(cart) -> None:
         remark, size = said[quantity], np.abs(x[:, 0])
         slack = 0.01 * size.max() if quantity == "u" else 0.0  # its value is that of the last stage
         assert abs(remark.value) == pytest.approx(size.max(), abs=slack)
-        assert remark.at == pytest.approx(every.t[size.argmax()], abs=2e-3)
-        assert remark.start == pytest.approx(every.t[np.flatnonzero(size > limit)[0]], abs=2e-3)
-        assert remark.duration == pytest.approx(np.sum(size > limit) * 1e-3, abs=5e-3)
+        assert remark.at_s == pytest.approx(every.t[size.argmax()], abs=2e-3)
+        assert remark.start_s == pytest.approx(every.t[np.flatnonzero(size > limit)[0]], abs=2e-3)
+        assert remark.duration_s == pytest.approx(np.sum(size > limit) * 1e-3, abs=5e-3)
         assert (remark.joint, abs(remark.limit)) == ("slide", limit)
 
 
@@ -161,7 +161,7 @@ def test_a_start_beyond_a_limit_is_said(cart) -> None:
     """From 0 s, though the first step leaves it at once."""
     run = rd.simulate(cart, q0=[2.0 + 1e-6, 0.0], v0=[-1.0, 0.0], controller=None, duration_s=0.1)
     (said,) = run.remarks
-    assert (said.kind, said.start, said.value, said.limit) == (RemarkKind.BEYOND, 0.0, 2.0 + 1e-6, 2.0)
+    assert (said.kind, said.start_s, said.value, said.limit) == (RemarkKind.BEYOND, 0.0, 2.0 + 1e-6, 2.0)
 
 
 def test_an_adaptive_run_is_watched_at_its_steps() -> None:
@@ -287,7 +287,9 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         middle = np.sqrt(low * high)
         low, high = (middle, high) if radius(middle) < 1 else (low, middle)
     period = part * low
-    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0]), kp, kd, period), actuation_delay=1.0)
+    loop = rd.control.Loop(
+        rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd, period_s=period), actuation_delay_periods=1.0
+    )
     run = rd.simulate(
         joint, [1e-6], duration_s=1000 * period, controller=loop, method="RK4", step_s=period, engine=engine,
         estimate_error=False,
@@ -308,14 +310,14 @@ def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
     for bend, says in ((1e-3, True), (1.0, False)):
         q = np.array([0.4, bend])
         at = arm.placement(q, frame)[:3, 3]
-        law = rd.control.OperationalSpace(arm, frame, rd.control.line(at, at, 1.0), 50.0, 10.0, rows=(0, 2))
+        law = rd.control.OperationalSpace(arm, frame, rd.control.line(at, at, 1.0), kp=50.0, kd=10.0, rows=(0, 2))
         run = rd.simulate(arm, q, duration_s=0.3, controller=law, estimate_error=False, **steps)
         assert (RemarkKind.DAMPED in kinds(run)) == says
         if says:
             (said,) = (each for each in run.remarks if each.kind is RemarkKind.DAMPED)
             J = arm.jacobian(q, frame)[[0, 2]]
             assert said.value == pytest.approx(np.linalg.eigvalsh(J @ np.linalg.inv(arm.M(q)) @ J.T)[0], rel=1e-6)
-            assert said.duration == pytest.approx(0.3)
+            assert said.duration_s == pytest.approx(0.3)
             assert "task damped near a singularity: tip for 0.3 s from 0 s" in run.summary
 
 

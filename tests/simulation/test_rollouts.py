@@ -32,13 +32,13 @@ SETUP = rd.Setup(
     Q,
     V,
     0.2,
-    rd.control.PD(REFERENCE, 40.0, [4.0, 3.0]),
+    rd.control.PD(REFERENCE, kp=40.0, kd=[4.0, 3.0]),
     method="RK4",
     step_s=2e-3,
     record_every_s=0.01,
 )
 
-PID = replace(SETUP, controller=rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
+PID = replace(SETUP, controller=rd.control.PID(REFERENCE, kp=40.0, ki=30.0, kd=4.0, effort_limit=3.0, period_s=0.004))
 ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
 NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
 EVERYTHING = ("q", "v", "u", "energy", "work")
@@ -66,7 +66,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     gains = {"kp": rng.uniform(20, 60, 5), "kd": rng.uniform(2, 5, (5, 2))}
     gains |= {"viscous_friction.viscous": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
     masses = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.viscous": rng.uniform(0, 1, 70)}
-    known = rd.control.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0)
+    known = rd.control.PDGravity(NOMINAL, REFERENCE, kp=40.0, kd=4.0)
     stops = rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
     levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
     walls = {"joint_stops.upper": [[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]], "kp": [20.0, 30.0, 40.0]}
@@ -74,7 +74,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     chosen = {"method": rd.integrate.Adaptive(), "step_s": None, "record_every_s": 0.05, "engine": "compiled"}
     body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
     resting = rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)  # pushed away from v = 0: no reversal
-    push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
+    push = rd.control.PD(rd.control.hold(Q + 3.0), kp=[20.0, 0.8], kd=0.0)
     bristles = rd.effects.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
     odd = {"duration_s": 0.123, "record_every_s": 0.0101}  # the run does not hold it a whole number of times
     gauss = rd.integrate.method("GaussLegendre4")
@@ -277,7 +277,7 @@ def test_runs_are_numbered_as_lists_are() -> None:
 
 def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
     """Noise is of the number of a run in its batch, whatever its number in a slice, a slice of one, or backwards."""
-    loop = rd.control.Loop(rd.control.PD(REFERENCE, 40.0, 4.0, period_s=4e-3), position=[rd.control.Noise(0.01)])
+    loop = rd.control.Loop(rd.control.PD(REFERENCE, kp=40.0, kd=4.0, period_s=4e-3), position=[rd.control.Noise(0.01)])
     runs = rd.rollouts(replace(SETUP, controller=loop), [Q] * 6)
     for some in (runs[2:5], runs[1:][1:4], runs[::-2]):
         for i in range(3):
@@ -384,7 +384,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
         r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
-            "q0": starts(4), "most_bytes": 100,
+            "q0": starts(4), "max_bytes": 100,
         },
     }.items():  # fmt: skip
         with pytest.raises(rd.RobotDynError, match=message):

@@ -32,7 +32,7 @@ STOPPED = rd.Plant(CART, [*DAMPED.effects, *rd.effects.joint_stops([-2.5, -4.0],
 HELD = rd.Plant(
     CART, [*DAMPED.effects, rd.effects.DryFriction([2.0, 0.01]), rd.effects.RigidStops([-2.5, -4.0], [1.2, 4.0])]
 )
-LATE = rd.control.Loop(rd.control.PD(GOAL, 500.0, [60.0, 0.1], period_s=0.02), actuation_delay=1.0)
+LATE = rd.control.Loop(rd.control.PD(GOAL, kp=500.0, kd=[60.0, 0.1], period_s=0.02), actuation_delay_periods=1.0)
 SWEEP = np.linspace(0.2, 1.6, B)
 
 
@@ -43,19 +43,19 @@ def setup(plant: rd.Plant, controller: object, method: str = "RK4", **options) -
 
 SCENES = {
     "late": (setup(LIMITED, LATE), {"kp": 500 * SWEEP, "effort_limit.limit": 150.0 * SWEEP}),
-    "continuous": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0)), {"kp": 500 * SWEEP}),
+    "continuous": (setup(DAMPED, rd.control.PD(GOAL, kp=400.0, kd=20.0)), {"kp": 500 * SWEEP}),
     "chattering": (
-        setup(LIMITED, rd.control.PD(GOAL, 10.0, 150.0, period_s=0.02)),
+        setup(LIMITED, rd.control.PD(GOAL, kp=10.0, kd=150.0, period_s=0.02)),
         {"effort_limit.limit": 100.0 * SWEEP},
     ),
-    "canonical": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0), "GaussLegendre2"), {"kp": 500 * SWEEP}),
+    "canonical": (setup(DAMPED, rd.control.PD(GOAL, kp=400.0, kd=20.0), "GaussLegendre2"), {"kp": 500 * SWEEP}),
     "cut at stops": (
-        setup(STOPPED, rd.control.PD(GOAL, 300.0, 20.0)),
+        setup(STOPPED, rd.control.PD(GOAL, kp=300.0, kd=20.0)),
         {"kp": 300 * SWEEP, "joint_stops.upper": 0.8 + SWEEP},
     ),
-    "time stepping": (setup(HELD, rd.control.PD(GOAL, 400.0, 20.0), "MoreauJean"), {"kp": 400 * SWEEP}),
+    "time stepping": (setup(HELD, rd.control.PD(GOAL, kp=400.0, kd=20.0), "MoreauJean"), {"kp": 400 * SWEEP}),
     "one by one": (
-        setup(STOPPED, rd.control.PID(GOAL, 300.0, 30.0, 20.0, effort_limit=80.0), "DOP853"),
+        setup(STOPPED, rd.control.PID(GOAL, kp=300.0, ki=30.0, kd=20.0, effort_limit=80.0), "DOP853"),
         {"effort_limit": 60 * SWEEP},
     ),
 }
@@ -98,7 +98,7 @@ def test_each_run_has_the_remarks_of_simulate(batch) -> None:
         ours = told(runs[i])
         assert ours.keys() == theirs.keys()
         for about, remark in theirs.items():
-            numbers = [[x.start, x.duration, x.at, x.value, x.limit or 0.0] for x in (ours[about], remark)]
+            numbers = [[x.start_s, x.duration_s, x.at_s, x.value, x.limit or 0.0] for x in (ours[about], remark)]
             if by_instants(runs, about):
                 np.testing.assert_allclose(*np.array(numbers)[:, :3], rtol=0, atol=2 * SPACING)
                 np.testing.assert_allclose(*np.array(numbers)[:, 3:], rtol=5e-3)
@@ -119,7 +119,7 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         assert {about for about, remark in told(runs).items() if i in remark.runs} == theirs.keys()
     for about, remark in told(runs).items():
         of = [told(alone[i])[about] for i in remark.runs]
-        size = [x.duration if x.kind is RemarkKind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
+        size = [x.duration_s if x.kind is RemarkKind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
         seen = by_instants(runs, about)
         assert size[0] >= max(size) * (1 - (5e-3 if seen else 1e-9))
         assert remark.text.endswith(" (at samples and 200 instants)") if seen else remark.text == of[0].text
@@ -135,7 +135,7 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
 @pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled with a lag"])
 def test_actuation_that_changes_between_ticks_is_seen_at_instants(sampled: bool) -> None:
     """Its extremes are those of a record of all steps, at each eighth and at samples; behind a lag at all of them."""
-    of = setup(LAGGING, rd.control.PD(GOAL, 300.0, 20.0, period_s=0.02 if sampled else 0.0))
+    of = setup(LAGGING, rd.control.PD(GOAL, kp=300.0, kd=20.0, period_s=0.02 if sampled else 0.0))
     of = replace(of, step_s=5e-4, record_every_s=0.0145)
     starts, record = Q + 0.3 * np.random.default_rng(5).normal(size=(B, 2)), ("u",)
     runs = rd.rollouts(of, starts, record=record)
@@ -211,7 +211,7 @@ def test_tracking_errors_of_a_frame() -> None:
     q = np.array([0.4, 0.9])
     at = arm.placement(q, "tip")[:3, 3]
     law = rd.control.OperationalSpace(
-        arm, "tip", rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), 50.0, 10.0, rows=(0, 2)
+        arm, "tip", rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), kp=50.0, kd=10.0, rows=(0, 2)
     )
     given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, method="RK4", step_s=4e-3)
     runs = rd.rollouts(given, np.add(q, [[0.0, 0.1], [0.2, -0.1], [0.1, 0.3]]), [[0.1, 0.2], [0.3, 0.1], [1e5, 3e7]])
@@ -236,12 +236,16 @@ def test_a_batch_of_one_speaks_of_a_run() -> None:
 def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     """Both sides of a limit of 0 are one: u = 0 is at it throughout, which is as long as the run, not twice that."""
     given = rd.Setup(
-        rd.Plant(CART, [rd.effects.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.control.PD(GOAL, 40.0, 4.0, period_s=0.02)
+        rd.Plant(CART, [rd.effects.EffortLimit([0.0, 1.0])]),
+        Q,
+        V,
+        0.2,
+        rd.control.PD(GOAL, kp=40.0, kd=4.0, period_s=0.02),
     )
     runs = rd.rollouts(replace(given, method=rd.integrate.method("RK4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
         (at,) = (each for each in remarks if each.kind is RemarkKind.EFFORT_REACHED and each.joint == "slide")
-        assert at.duration == pytest.approx(0.2, rel=1e-9)
+        assert at.duration_s == pytest.approx(0.2, rel=1e-9)
 
 
 def test_growth_over_a_run_counts_its_periods() -> None:
@@ -250,7 +254,12 @@ def test_growth_over_a_run_counts_its_periods() -> None:
     told, end = {}, {}
     for duration in (0.3, 60.0):
         setup = rd.Setup(
-            rd.Plant(arm), [1e-3], None, duration, rd.control.PD(goal, 40.0, 100.0, period_s=0.1), estimate_error=False
+            rd.Plant(arm),
+            [1e-3],
+            None,
+            duration,
+            rd.control.PD(goal, kp=40.0, kd=100.0, period_s=0.1),
+            estimate_error=False,
         )
         run = rd.simulate(setup)
         (told[duration],) = (remark for remark in run.remarks if remark.kind is RemarkKind.UNSTABLE)

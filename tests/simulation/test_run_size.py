@@ -10,7 +10,7 @@ from robot_dyn.simulation.setup.setup import check_record, samples, segments, st
 from tests.long import long
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.effects.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
-LAW = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
+LAW = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=3.0, kd=1.0, period_s=0.01)
 
 
 @pytest.mark.parametrize("duration", [1e9, 1e18, 1e300])
@@ -66,6 +66,6 @@ def test_the_size_that_is_told_bounds_the_run(method, law, period: float) -> Non
 
 def test_what_fits_is_not_refused() -> None:
     """An hour of 1 kHz control with samples of 10 ms: 3.6e6 ticks, 3.6e5 samples."""
-    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.001)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=3.0, kd=1.0, period_s=0.001)
     setup = rd.Setup(ARM, [0.1, 0.2], duration_s=3600.0, controller=law, record_every_s=0.01)
     check_record(setup)

@@ -27,7 +27,7 @@ def test_a_loop_is_stable_up_to_where_the_radius_of_a_period_passes_1(seed: int,
 @pytest.mark.parametrize(("period", "duration"), [(0.11, 0.5), (0.15, 2.0), (0.3, 2.0), (0.3, 0.2)])
 def test_a_short_run_makes_no_loop_stable(period: float, duration: float) -> None:
     """A mass under PD is stable for T < 2 m/kd, here 0.05 s, and the run grows by ρ in each whole period of it."""
-    law = rd.control.PD(rd.control.hold([0.0]), 100.0, 40.0, period)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=100.0, kd=40.0, period_s=period)
     advice = rd.advise(BLOCK, [0.1], duration_s=duration, controller=law, engine="interpreted")
     u = np.array([-100.0, -40.0])
     made = np.array([[1, period], [0, 1]]) + np.outer([period**2 / 2, period], u)
@@ -76,7 +76,10 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
         return float(np.abs(np.linalg.eigvals(made)).max())
 
     advice = rd.advise(
-        arm, q, duration_s=0.05, controller=rd.control.PD(rd.control.hold(q), *map(np.array, (kp, kd)), 1e-3)
+        arm,
+        q,
+        duration_s=0.05,
+        controller=rd.control.PD(rd.control.hold(q), kp=np.array(kp), kd=np.array(kd), period_s=1e-3),
     )
     assert advice.stable
     assert "control period 0.001 s: marginal, some deviations neither decay nor grow; the loop is up to" in advice.text
@@ -86,8 +89,8 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
 @pytest.mark.parametrize(
     ("law", "remedy"),
     [
-        (rd.control.PD(rd.control.hold([0.0]), 100.0, 0.0, 1e-3), "lower gains, or less delay"),
-        (rd.control.PID(rd.control.hold([0.0]), 100.0, 1500.0, 10.0, period_s=1e-3), "other gains"),
+        (rd.control.PD(rd.control.hold([0.0]), kp=100.0, kd=0.0, period_s=1e-3), "lower gains, or less delay"),
+        (rd.control.PID(rd.control.hold([0.0]), kp=100.0, ki=1500.0, kd=10.0, period_s=1e-3), "other gains"),
     ],
 )
 def test_a_loop_that_is_unstable_at_every_period_says_why(law: rd.control.Controller, remedy: str) -> None:
@@ -111,7 +114,7 @@ def test_a_step_has_its_limit_however_short_the_run() -> None:
 @pytest.mark.parametrize("options", [{"method": "RK4", "step_s": 1e-3}, {"method": "DOP853"}])
 def test_a_run_that_its_loop_ends_says_so_and_not_to_take_a_smaller_step(options) -> None:
     """A pendulum with a spring of 1e8 N m/rad on ticks of 10 ms, whatever the step."""
-    joint, law = rd.load("pendulum"), rd.control.PD(rd.control.hold([0.0]), 1e8, 0.0, 0.01)
+    joint, law = rd.load("pendulum"), rd.control.PD(rd.control.hold([0.0]), kp=1e8, kd=0.0, period_s=0.01)
     run = rd.simulate(joint, [0.1], duration_s=5.0, controller=law, estimate_error=False, **options)
     runs = rd.rollouts(joint, [[0.1], [0.2]], duration_s=5.0, controller=law, **options)
     for outcome in (run.outcome, runs.outcome(0), runs.outcome(1)):
@@ -125,7 +128,7 @@ def test_a_run_that_its_step_ends_under_a_stable_loop_says_so() -> None:
     """A damper of 1e5 per second, which RK4 follows with steps of 28 µs; the loop is stable up to 2 b/kp."""
     plant, law = (
         rd.Plant(BLOCK, [rd.effects.ViscousFriction(1e5)]),
-        rd.control.PD(rd.control.hold([0.0]), 100.0, 0.0, 0.01),
+        rd.control.PD(rd.control.hold([0.0]), kp=100.0, kd=0.0, period_s=0.01),
     )
     run = rd.simulate(
         plant, [0.1], [1.0], duration_s=0.5, controller=law, method="RK4", step_s=1e-3, estimate_error=False
@@ -147,7 +150,7 @@ def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
     plant, upright = rd.Plant(arm), rd.control.hold([np.pi])
 
     def remarks(period: float) -> list:
-        law = rd.control.PD(upright, 0.0, kd, period_s=period)
+        law = rd.control.PD(upright, kp=0.0, kd=kd, period_s=period)
         run = rd.simulate(
             plant, [np.pi - 0.01], duration_s=0.3, controller=law, method="RK4", step_s=1e-3, estimate_error=False
         )

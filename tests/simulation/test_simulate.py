@@ -114,7 +114,7 @@ def test_every_engine_gives_the_same_run() -> None:
 def test_a_sample_keeps_the_equation_of_motion() -> None:
     """M a + C v + N = τ at each sample, with the acceleration that is recorded; v = dq/dt and a = dv/dt."""
     run = rd.simulate(
-        SMOOTH, **START, duration_s=0.5, controller=rd.control.PD(rd.control.hold([0.1, 0.2]), [20.0, 9.0], 2.0)
+        SMOOTH, **START, duration_s=0.5, controller=rd.control.PD(rd.control.hold([0.1, 0.2]), kp=[20.0, 9.0], kd=2.0)
     )
     for t, q, v, a, u in zip(run.t, run.q, run.v, run.a, run.u, strict=True):
         np.testing.assert_allclose(SMOOTH.inverse_dynamics(q, v, a, t=t), u, atol=1e-11)
@@ -171,7 +171,7 @@ def test_a_frame_that_follows_a_circle_has_a_tracking_error_in_metres() -> None:
     q0 = np.array([0.3, -1.3, 1.6, -1.9, -1.5, 0.2])
     g = arm.placement(q0, "tool0")
     path = rd.control.circle(g[:3, 3] + [0.0, 0.05, 0.0], 0.05, [0, 0, 1], 1.0, toward=[0, -1, 0], rotation=g[:3, :3])
-    law = rd.control.OperationalSpace(arm, "tool0", path, 400.0, 40.0)
+    law = rd.control.OperationalSpace(arm, "tool0", path, kp=400.0, kd=40.0)
     run = rd.simulate(arm, q0=q0, duration_s=0.2, controller=law, method="RK4", step_s=4e-3, estimate_error=False)
     desired, p = path.at(run.t)[0], arm.placement(run.q, "tool0")[:, :3, 3]
     assert run.desired is None
@@ -200,7 +200,7 @@ def test_the_summary_says_what_acted_and_nothing_else() -> None:
     plant = rd.Plant(
         loaded, [rd.effects.EffortLimit(5.0), *rd.effects.joint_stops(-2.0, 2.0), rd.effects.ViscousFriction(0.1)]
     )
-    run = rd.simulate(plant, controller=rd.control.PD(rd.control.hold([0.3, 0.4]), 1.0, 1.0), **start)
+    run = rd.simulate(plant, controller=rd.control.PD(rd.control.hold([0.3, 0.4]), kp=1.0, kd=1.0), **start)
     acting = "gravity 5 m/s²", "payload 0.5 kg on tip", "mass_scale 1.1", "armature"
     assert run.acting == (*acting, "effort_limit", "joint_stops", "viscous_friction", "control")
     assert f"\neffects: {', '.join(run.acting)}\n" in run.summary
@@ -211,7 +211,7 @@ def test_the_summary_says_what_acted_and_nothing_else() -> None:
 @pytest.mark.parametrize(("name", "unit"), [("planar_2r", "rad"), ("cart_pole", "m or rad")])
 def test_the_summary_states_units(name: str, unit: str) -> None:
     """Of the errors of q; m and rad where both kinds of joints are."""
-    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 1.0, 1.0)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=1.0, kd=1.0)
     text = rd.simulate(rd.load(name), q0=[0.1, 0.2], duration_s=0.05, controller=law).summary
     assert f"\nerror of q [{unit}]: " in text and f"\ntracking error of q [{unit}]: " in text
     assert " of the energy exchanged" in text

@@ -23,11 +23,11 @@ def controllers(period: float) -> list:
     """Every law of joint space, with gains that are not round."""
     kp, kd = rd.control.gains_from([3.0, 0.4], 9.0, 0.8)
     laws = [
-        rd.control.PD(GOAL, kp, kd, period_s=period),
-        rd.control.PID(GOAL, kp, 40.0, kd, effort_limit=[30.0, 12.0], period_s=period),
+        rd.control.PD(GOAL, kp=kp, kd=kd, period_s=period),
+        rd.control.PID(GOAL, kp=kp, ki=40.0, kd=kd, effort_limit=[30.0, 12.0], period_s=period),
     ]
     laws += [
-        law(DOUBLE, GOAL, kp, kd, period_s=period)
+        law(DOUBLE, GOAL, kp=kp, kd=kd, period_s=period)
         for law in (rd.control.ComputedTorque, rd.control.PDGravity, rd.control.FeedForward)
     ]
     return laws
@@ -42,7 +42,7 @@ def stepped(method, step: float) -> dict:
 def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> None:
     """At a tick it is the law's, of the state there; up to the next one, the same to the last bit."""
     period, count = 0.012, 20
-    law = rd.control.PDGravity(DOUBLE, GOAL, [80.0, 20.0], [9.0, 2.0], period_s=period)
+    law = rd.control.PDGravity(DOUBLE, GOAL, kp=[80.0, 20.0], kd=[9.0, 2.0], period_s=period)
     common = {**START, "duration_s": period * count, "controller": law, "record_every_s": 1e-4}
     run = rd.simulate(PLANT, **common, **stepped(method, 2e-3))
     ticks = np.searchsorted(run.t, period * np.arange(count + 1) - 1e-12)
@@ -60,7 +60,9 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
 @pytest.mark.parametrize("step", [0.012, *long([1e-3])], ids=["a step a tick", "twelve steps a tick"])
 def test_states_of_a_sampled_pid_advance_once_a_tick(method, step: float) -> None:
     """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
-    law = rd.control.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
+    law = rd.control.PID(
+        GOAL, kp=[80.0, 20.0], ki=[900.0, 400.0], kd=[9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012
+    )
     run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, **stepped(method, step))
     assert run.outcome.ending == "finished", run.outcome.text
     ticks = np.searchsorted(run.t, 0.012 * np.arange(21) - 1e-12)
@@ -90,7 +92,7 @@ def test_continuous_control_is_the_limit_of_a_small_period(kind: int) -> None:
 def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     """ë + 2 ζ ω ė + ω² e = 0 from e(0), whatever the arm: the closed form within the 1e-10 of its estimate."""
     omega, zeta = 9.0, 0.6
-    law = rd.control.ComputedTorque(DOUBLE, rd.control.hold([0.9, 0.2]), *rd.control.gains_from(1.0, omega, zeta))
+    law = rd.control.ComputedTorque(DOUBLE, rd.control.hold([0.9, 0.2]), bandwidth_rad_s=omega, damping_ratio=zeta)
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, method="RK4", step_s=5e-4)
     e0, de0, decay = np.array([0.5, 0.9]), -np.array(START["v0"]), zeta * omega
     damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
@@ -106,7 +108,7 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
 def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
     """What is recorded is what acts, cut at the limit where the law asks for more, and the motion is that of it."""
     limit = np.array([20.0, 3.0])
-    law = rd.control.PD(GOAL, [900.0, 300.0], [20.0, 8.0], period_s=period)
+    law = rd.control.PD(GOAL, kp=[900.0, 300.0], kd=[20.0, 8.0], period_s=period)
     plant = rd.Plant(DOUBLE, [rd.effects.EffortLimit(limit)])
     run = rd.simulate(plant, **START, duration_s=0.3, controller=law, estimate_error=False)
     assert (np.abs(run.u) <= limit).all()
@@ -124,7 +126,7 @@ def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
 def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
     push = rd.effects.ExternalWrench("tip", [1.0, 0.0, -2.0, 0.0, -0.5, 0.0], start_s=0.1, end_s=edge)
-    law = rd.control.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
+    law = rd.control.PD(GOAL, kp=[8.0, 2.0], kd=[1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
     run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, method="RK4", step_s=5e-3)
     assert np.diff(run.t).min() > 1e-3
     assert run.error is not None

@@ -63,9 +63,9 @@ def test_a_finished_run_says_so() -> None:
 
 
 LAWS = {
-    "PD": rd.control.PD(rd.control.hold(np.full(6, 0.3)), 1e4, 1e3),
-    "sampled PD": rd.control.PD(rd.control.hold(np.full(6, 0.3)), 1e4, 1e3, period_s=0.05),
-    "computed torque": rd.control.ComputedTorque(UR5, rd.control.hold(np.full(6, 0.3)), 1e6, 1e3),
+    "PD": rd.control.PD(rd.control.hold(np.full(6, 0.3)), kp=1e4, kd=1e3),
+    "sampled PD": rd.control.PD(rd.control.hold(np.full(6, 0.3)), kp=1e4, kd=1e3, period_s=0.05),
+    "computed torque": rd.control.ComputedTorque(UR5, rd.control.hold(np.full(6, 0.3)), kp=1e6, kd=1e3),
 }
 
 
@@ -152,7 +152,10 @@ GOOD = {**START, "duration_s": 0.1}
         ({"step_s": 0}, "step_s must be a positive number of seconds, at least 1e-12; got 0"),
         ({"step_s": "fine"}, "step_s must be a real number, got 'fine'"),
         ({"record_every_s": -0.1}, "record_every_s must"),
-        ({"controller": rd.control.PD(rd.control.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
+        (
+            {"controller": rd.control.PD(rd.control.hold([0.0, 0.0, 0.0]), kp=1.0, kd=1.0)},
+            "drives 3 joints, the plant has 2",
+        ),
         ({"controller": 3}, "controller"),
         ({"method": "rk44"}, "no integration method 'rk44'; nearest: RK4"),
         ({"method": rd.integrate.Adaptive}, "method: give a name"),
@@ -271,7 +274,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
 @pytest.mark.parametrize("period", [0.0, 0.01])
 def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period: float, monkeypatch) -> None:
     """One sample, the state at 0 s; what a controller would have held is not known."""
-    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=period)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=3.0, kd=1.0, period_s=period)
     setup = rd.Setup(rd.Plant(DOUBLE), method="RK4", **START, duration_s=0.2, controller=law, engine=engine)
     rd.simulate(setup)  # compiled, and looked at, before
 

@@ -40,7 +40,7 @@ def test_springs_control_and_narrow_friction_are_told_apart() -> None:
     assert (made.joint, made.source) == ("joint_2", "spring")
     assert abs(made.eigenvalue) == pytest.approx(abs(made.eigenvalue.imag), rel=1e-3)
     assert "changes with" in str(made)
-    law = rd.control.PD(rd.control.hold([0.1, 0.2]), [10.0, 10.0], [1e6, 1.0])
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), kp=[10.0, 10.0], kd=[1e6, 1.0])
     made = found([damper], law)
     assert (made.joint, made.source) == ("joint_1", "control")
     slow = found([damper], law, held=np.zeros(2))  # in zero-order hold it has no slope

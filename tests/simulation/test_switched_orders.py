@@ -14,16 +14,22 @@ ROUGH = rd.control.PiecewisePolynomial(  # its velocity jumps
     [[[0.3, -0.2], [1.0, 0.4]], [[0.51, -0.116], [-0.6, 1.2]], [[0.318, 0.268], [0.9, -0.7]]],
 )
 FRICTION = rd.effects.LuGreFriction([60.0, 40.0], [2.0, 1.0], [1.0, 0.5], [1.5, 0.8], [2.0, 1.0], 1.0)
-PD = rd.control.PD(rd.control.quintic([0.1, 0.2], [0.9, -0.4], 0.5), [150.0, 60.0], [12.0, 5.0])
+PD = rd.control.PD(rd.control.quintic([0.1, 0.2], [0.9, -0.4], 0.5), kp=[150.0, 60.0], kd=[12.0, 5.0])
 PUSH = rd.effects.ExternalWrench("tip", [30.0, -20.0, 0.0, 0.0, 0.0, 2.0], "world_aligned", 0.3137, 0.3149)
 FAR, LIMIT = rd.control.quintic([0.1, 0.2], [1.3, -0.7], 0.8), [18.0, 5.0]
 SCENES = {
-    "break of the reference": ([], rd.control.PD(ROUGH, [150.0, 60.0], [12.0, 5.0])),
+    "break of the reference": ([], rd.control.PD(ROUGH, kp=[150.0, 60.0], kd=[12.0, 5.0])),
     "window shorter than a step": ([PUSH], PD),
     "stops struck": (rd.effects.joint_stops([-1.2, -0.9], [0.35, 0.8], 2e3, 20.0), None),
     "bristles that reverse": ([FRICTION], PD),
-    "limits reached and left": ([rd.effects.EffortLimit(LIMIT)], rd.control.ComputedTorque(ARM, FAR, 144.0, 24.0)),
-    "limits, with back-calculation": ([], rd.control.PID(FAR, [120.0, 60.0], [300.0, 150.0], [20.0, 8.0], LIMIT)),
+    "limits reached and left": (
+        [rd.effects.EffortLimit(LIMIT)],
+        rd.control.ComputedTorque(ARM, FAR, kp=144.0, kd=24.0),
+    ),
+    "limits, with back-calculation": (
+        [],
+        rd.control.PID(FAR, kp=[120.0, 60.0], ki=[300.0, 150.0], kd=[20.0, 8.0], effort_limit=LIMIT),
+    ),
 }
 LIMITED = {"limits reached and left": 7, "limits, with back-calculation": 3}  # events
 

@@ -13,7 +13,7 @@ from robot_dyn.foundations import QueryError
 CART = rd.load("cart_pole")  # a joint that slides, and one that turns
 GOAL = rd.control.quintic([0.1, 0.3], [0.4, -0.2], 0.5)
 PLANT = rd.Plant(CART, [rd.effects.ViscousFriction([0.4, 0.05])])
-SETUP = rd.Setup(PLANT, [0.11, 0.32], [0.2, -0.4], 0.3, rd.control.PD(GOAL, 90.0, 9.0))
+SETUP = rd.Setup(PLANT, [0.11, 0.32], [0.2, -0.4], 0.3, rd.control.PD(GOAL, kp=90.0, kd=9.0))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_a_frame_has_its_tracking_error_by_axis() -> None:
     q = np.array([0.4, 0.9])
     at = arm.placement(q, "tip")[:3, 3]
     line = rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2)
-    controller = rd.control.OperationalSpace(arm, "tip", line, 50.0, 10.0, rows=(0, 2))
+    controller = rd.control.OperationalSpace(arm, "tip", line, kp=50.0, kd=10.0, rows=(0, 2))
     run = rd.simulate(rd.Plant(arm), q, controller=controller, duration_s=0.02, estimate_error=False)
     assert run.desired is None
     np.testing.assert_array_equal(run.table()["tracking error y [m]"], run.tracking_error[:, 1])

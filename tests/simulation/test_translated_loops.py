@@ -33,10 +33,10 @@ ARM = rd.load("planar_2r")
 PLAIN = [name for name in FIXED_STEP if method(name).plain]
 Q0, V0 = np.array([0.31, -0.73]), np.array([0.9, -1.7])
 SAMPLED = rd.control.Loop(
-    rd.control.PD(rd.control.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4], 0.03), actuation=rd.control.Noise(0.2),
-    actuation_delay=0.5
+    rd.control.PD(rd.control.hold([0.4, -0.2]), kp=[9.0, 5.0], kd=[0.7, 0.4], period_s=0.03),
+    actuation=rd.control.Noise(0.2), actuation_delay_periods=0.5
 )  # fmt: skip
-CONTINUOUS = rd.control.PD(rd.control.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4])
+CONTINUOUS = rd.control.PD(rd.control.hold([0.4, -0.2]), kp=[9.0, 5.0], kd=[0.7, 0.4])
 SMOOTH = [rd.effects.ViscousFriction([0.3, 0.2]), rd.effects.RegularisedCoulombFriction([0.2, 0.1], 0.05)]
 BOUNDED = [*rd.effects.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0, 4.0), rd.effects.ViscousFriction([0.1, 0.2])]
 BODY = rd.effects.CarriedPayload(rd.Payload("tip", 0.3, (0.1, 0.0, 0.05)), 0.2, 0.4)
@@ -158,7 +158,10 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
 def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
     made = setup(
-        HELD, "DOP853", duration_s=6.0, controller=rd.control.PD(rd.control.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1])
+        HELD,
+        "DOP853",
+        duration_s=6.0,
+        controller=rd.control.PD(rd.control.hold([1.4, -1.9]), kp=[60.0, 30.0], kd=[0.1, 0.1]),
     )
     run, calls = Run(made, choose(made)), []
     inner = run.steps.loop

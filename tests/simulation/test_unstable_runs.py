@@ -36,7 +36,7 @@ def test_gains_that_excite_an_elastic_gear_are_named_with_their_growth(joint: rd
         A = [[0, 1, 0, 0], [0, 0, k / INERTIA, 0], [0, -1, 0, 1], [-s * kp / J, -s * kd / J, -k / J, 0]]
         return float(np.linalg.eigvals(A).real.max())
 
-    law = rd.control.PD(rd.control.hold([0.0]), kp, kd)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd)
     plant = rd.Plant(joint, [rd.effects.SeriesElastic(k, J)])
     run = rd.simulate(plant, [0.01], duration_s=60.0, controller=law)
     remark = remark_of(run, RemarkKind.UNSTABLE)
@@ -58,7 +58,7 @@ def test_lower_gains_are_advised_only_where_they_are_stable(joint: rd.Robot) -> 
         )
 
     s = next(0.5**i for i in range(1, 30) if growth(0.5**i) < 0)
-    law = rd.control.PD(rd.control.hold([0.0]), kp, kd)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=kp, kd=kd)
     plant = rd.Plant(joint, [rd.effects.SeriesElastic(k, J), rd.effects.ViscousFriction(b)])
     run = rd.simulate(plant, [0.01], duration_s=200.0, controller=law)
     assert growth(2 * s) > 0 and run.outcome.ending == "diverged"
@@ -73,7 +73,7 @@ def test_an_arm_with_gears_and_high_gains_is_reported_as_unstable_not_as_stiff(n
     arm = rd.load(name)
     n, q0 = arm.n, np.full(arm.n, 0.3)
     gears = rd.effects.SeriesElastic(np.full(n, 2e4), np.full(n, 2e-4), ratio=np.full(n, 100.0), damping=5.0)
-    law = rd.control.FeedForward(arm, rd.control.quintic(q0, q0 + 0.4, 1.0), 2e4, 800.0)
+    law = rd.control.FeedForward(arm, rd.control.quintic(q0, q0 + 0.4, 1.0), kp=2e4, kd=800.0)
     run = rd.simulate(rd.Plant(arm, [gears]), q0, duration_s=2.0, controller=law)
     assert run.outcome.ending == "diverged"
     assert run.outcome.text.startswith("control loop unstable")
@@ -86,7 +86,7 @@ def test_a_step_just_above_the_longest_stable_one_is_reported_with_that_one(join
     """v̇ = −(kd/I) v: RK4 is stable up to h = 2.785 I/kd."""
     kd = 100.0
     limit = STABLE * INERTIA / kd
-    law = rd.control.PD(rd.control.hold([0.0]), 0.0, kd)
+    law = rd.control.PD(rd.control.hold([0.0]), kp=0.0, kd=kd)
     run = rd.simulate(
         rd.Plant(joint), [0.1], [1.0], duration_s=5000 * limit * part, controller=law, method="RK4",
         step_s=limit * part,
@@ -122,7 +122,7 @@ def test_a_run_that_a_stop_throws_out_of_its_steps_has_not_finished() -> None:
     """A stop of 1e12 N m/rad, of which the steps know nothing until the joint is in it."""
     arm = rd.load("planar_2r")
     stops = np.atleast_1d(rd.effects.joint_stops([-1.0, -1.0], [0.5, 1.0], 1e12))
-    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 40.0, 4.0)
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), kp=40.0, kd=4.0)
     run = rd.simulate(
         rd.Plant(arm, [rd.effects.EffortLimit(30.0), *stops]), [0.4, -0.7], [3.0, 5.0], duration_s=0.2, controller=law,
         method="RK4", step_s=2e-3,
@@ -136,7 +136,7 @@ def test_a_run_that_a_stop_throws_out_of_its_steps_has_not_finished() -> None:
 def test_no_event_of_states_that_overflow_is_after_the_end_of_the_run(kp: float, engine) -> None:
     """Explosive gains, with a stop and an effort limit that are passed in steps of which the end is no number."""
     arm = rd.load("pendulum")
-    law = rd.control.PD(rd.control.hold([0.2]), kp, 0.0)
+    law = rd.control.PD(rd.control.hold([0.2]), kp=kp, kd=0.0)
     plant = rd.Plant(arm, [rd.effects.EffortLimit(1e300), *rd.effects.joint_stops([-1.0], [1.0], 1e4)])
     run = rd.simulate(plant, [0.3], [0.1], duration_s=0.05, controller=law, method="RK4", step_s=2e-3, engine=engine)
     assert run.outcome.ending == "diverged"

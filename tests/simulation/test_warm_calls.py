@@ -41,11 +41,11 @@ WITHOUT_TIMES = [name for name in NAMES if name != "statistics"]
 def setups() -> dict[str, rd.Setup]:
     """Setups of values: levels that are passed, ticks, thresholds, states, what comes and goes, an open ledger."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), rd.effects.EffortLimit([4.0, 2.0])])
-    sampled = rd.control.PD(PLAN, [60.0, 30.0], [6.0, 3.0], period_s=0.01)
+    sampled = rd.control.PD(PLAN, kp=[60.0, 30.0], kd=[6.0, 3.0], period_s=0.01)
     stops = rd.effects.joint_stops([-0.5, -0.5], [0.5, 0.5], 2e3, 0.1)
     held = [rd.effects.DryFriction([1.5, 0.5]), rd.effects.RigidStops(-0.6, 0.6)]
     tool = rd.effects.CarriedPayload(rd.Payload("tip", 0.5), 0.05, 0.12)
-    pid = rd.control.PID(PLAN, 60.0, 20.0, 6.0)
+    pid = rd.control.PID(PLAN, kp=60.0, ki=20.0, kd=6.0)
     compiled: dict[str, Any] = {"engine": "compiled", "duration_s": 0.2}
     short: dict[str, Any] = {
         "engine": "interpreted",
@@ -56,7 +56,8 @@ def setups() -> dict[str, rd.Setup]:
     return {
         "free swing": rd.Setup(rd.Plant(ARM), Q, V, method="DOP853", **compiled),
         "computed torque": rd.Setup(
-            plant, Q, V, controller=rd.control.ComputedTorque(ARM, PLAN, 90.0, 15.0), **compiled, about={"author": "me"}
+            plant, Q, V, controller=rd.control.ComputedTorque(ARM, PLAN, kp=90.0, kd=15.0),
+            **compiled, about={"author": "me"},
         ),
         "sampled, RK4": rd.Setup(plant, Q, V, controller=sampled, method="RK4", **compiled),
         "steps too long": rd.Setup(
@@ -287,7 +288,7 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
 
 def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> None:
     arm = rd.accuracy.warn_below(ARM, 15.9)  # of the 16 of a float: the start has fewer
-    control = rd.control.PD(PLAN, 10.0, 1.0, period_s=0.01)
+    control = rd.control.PD(PLAN, kp=10.0, kd=1.0, period_s=0.01)
     changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
     counts = []
     with pytest.warns(rd.PrecisionWarning):  # so do the checks of the setup, and of its machine code
@@ -376,7 +377,7 @@ def built_by(call: Callable[[], object], monkeypatch: pytest.MonkeyPatch) -> int
 
 @pytest.mark.parametrize("what", [ARM, rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])], ids=["robot", "plant"])
 def test_a_call_with_equal_arguments_builds_no_setup(what: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    controller = rd.control.PD(PLAN, 60.0, 6.0)
+    controller = rd.control.PD(PLAN, kp=60.0, kd=6.0)
 
     def call(q0: Any = (0.3, -0.4), **more: Any) -> None:
         more = {"duration_s": 0.02, "controller": controller, "engine": "interpreted", "about": {"a": "b"}} | more

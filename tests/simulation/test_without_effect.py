@@ -87,7 +87,7 @@ def test_folders_of_packages_that_are_none_are_refused(tmp_path) -> None:
 def test_a_controller_whose_model_has_other_joints_than_the_plant_is_refused() -> None:
     """Two arms of six of the UR5's joints each, as many as the plant has, but not the same ones."""
     plant, model = (UR5.with_(lock={name: 0.3}) for name in ("wrist_3_joint", "shoulder_pan_joint"))
-    law = rd.control.ComputedTorque(model, rd.control.hold(np.zeros(5)), 100.0, 20.0)
+    law = rd.control.ComputedTorque(model, rd.control.hold(np.zeros(5)), kp=100.0, kd=20.0)
     with pytest.raises(QueryError, match="model has the joint 'shoulder_lift_joint' where the plant has 'shoulder_pan"):
         rd.Setup(rd.Plant(plant), np.zeros(5), controller=law)
 
@@ -98,14 +98,14 @@ def test_a_frame_under_control_that_the_plant_lacks_is_told_before_the_run(tmp_p
     plant = rd.Plant(rd.load(tmp_path / "arm.urdf"))
     q0 = np.array([0.3, 0.9])
     p = ARM.placement(q0, "tip")[:3, 3]
-    law = rd.control.OperationalSpace(ARM, "tip", rd.control.line(p, p, 1.0), 100.0, 20.0, rows=(0, 2))
+    law = rd.control.OperationalSpace(ARM, "tip", rd.control.line(p, p, 1.0), kp=100.0, kd=20.0, rows=(0, 2))
     with pytest.raises(QueryError, match="'tip'"):
         rd.Setup(plant, q0, controller=law)
 
 
 def test_anti_windup_without_a_limit_is_refused() -> None:
     with pytest.raises(ControlError, match="tracking_time_s has no effect without an effort_limit"):
-        rd.control.PID(rd.control.hold([0.0]), 1.0, 1.0, 1.0, tracking_time_s=0.3)
+        rd.control.PID(rd.control.hold([0.0]), kp=1.0, ki=1.0, kd=1.0, tracking_time_s=0.3)
 
 
 # --- scenes
@@ -147,7 +147,7 @@ CONTROL = '[control]\nkind = "{}"\nbandwidth_rad_s = 10.0\n'
             SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]\nstart_s = 0.05\n',
             "no frame 'tipp'; nearest: tip",
         ),
-        (SCENE + '[[effect]]\nkind = "viscous_friction"\n', "viscous='urdf' has no effect"),
+        (SCENE + '[[effect]]\nkind = "viscous_friction"\n', 'viscous_N_m_s_per_rad = "urdf" has no effect'),
         (SCENE.replace("0.1", "true"), "duration_s: .*, got True"),
         (SCENE.replace("0.1", '"0.1"'), "duration_s: .*, got '0.1'"),
         (SCENE + "estimate_error = 0\n", "estimate_error: .*, got 0"),

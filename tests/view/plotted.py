@@ -18,7 +18,7 @@ def ur5():
     q = np.array([0.1, -1.2, 1.8, -2.2, -1.5, 0.3])
     plan = rd.control.quintic(q, q + np.array([0.3, -0.2, 0.1, 0.4, -0.3, 0.2]), 0.2)
     kp, kd = rd.control.gains_from(np.diag(arm.M(q)), 20.0)
-    controller = rd.control.PD(plan, kp, kd)
+    controller = rd.control.PD(plan, kp=kp, kd=kd)
     return rd.simulate(rd.Plant(arm), q0=q, v0=0 * q, duration_s=0.3, controller=controller, method="RK4", step_s=0.005)
 
 

@@ -196,7 +196,7 @@ def test_ten_seconds_of_ur5_stay_under_fifteen_megabytes() -> None:
     arm, q = rd.load("ur5"), np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
     plan = rd.control.via_points([0, 4, 7, 10], [q, q + 1, q - 0.5, q])
     kp, kd = rd.control.gains_from(1.0, bandwidth_rad_s=20.0)
-    drive = rd.control.ComputedTorque(arm, plan, kp, kd)
+    drive = rd.control.ComputedTorque(arm, plan, kp=kp, kd=kd)
     run = rd.simulate(arm, q, duration_s=10.0, controller=drive, method="RK4", estimate_error=False)
     assert len(run.t) == 10_001
     assert len(rd.replay(run).text.encode()) < 15e6

@@ -22,7 +22,7 @@ def sticking(payload: float = 0.0) -> rd.Trajectory:
     """A planar arm that follows a plan, sticks, meets a stop and has a controller that does not know its payload."""
     arm = rd.load("planar_2r")
     loaded = arm.with_(payload=rd.Payload("tip", payload)) if payload else arm
-    law = rd.control.ComputedTorque(arm, rd.control.quintic([0.4, -0.7], [0.9, -0.2], 0.3), 60.0, 5.0)
+    law = rd.control.ComputedTorque(arm, rd.control.quintic([0.4, -0.7], [0.9, -0.2], 0.3), kp=60.0, kd=5.0)
     effects = [
         rd.effects.DryFriction([3.0, 2.0], [4.0, 3.0], 0.05),
         rd.effects.RigidStops([-2.0, -2.0], [0.6, 2.0], 0.4),

@@ -17,7 +17,7 @@ def followed(mass: float) -> rd.Trajectory:
     arm = rd.load("planar_2r")
     loaded = arm.with_(payload=rd.Payload("tip", mass)) if mass else arm
     plan = rd.control.quintic([0.4, -0.7], [0.6, -0.4], 0.3)
-    law = rd.control.ComputedTorque(arm, plan, 100.0, 20.0)
+    law = rd.control.ComputedTorque(arm, plan, kp=100.0, kd=20.0)
     return rd.simulate(loaded, q0=[0.4, -0.7], duration_s=0.4, record_every_s=0.01, controller=law)
 
 

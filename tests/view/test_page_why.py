@@ -26,7 +26,7 @@ def run() -> rd.Trajectory:
     effects = [E.ViscousFriction(1.5), E.DryFriction(2.0), E.Spring(3.0, 0.2), E.EffortLimit("urdf")]
     start = np.array([0.1, -1.2, 1.4, -0.6, 1.2, 0.3])
     reference = rd.control.quintic(start, start + np.array([1.2, 0.5, -0.8, 0.7, -0.5, 0.9]), 0.35)
-    hold = rd.control.ComputedTorque(arm, reference, 100.0, 20.0)
+    hold = rd.control.ComputedTorque(arm, reference, kp=100.0, kd=20.0)
     return rd.simulate(rd.Plant(arm, effects), start, duration_s=0.4, controller=hold, estimate_error=False)
 
 
@@ -115,7 +115,7 @@ def test_the_table_of_a_joint_is_reached_by_keyboard(browser: Any, run: rd.Traje
 def test_an_actuation_beyond_the_effort_limit_of_the_file_is_marked(browser: Any) -> None:
     """A UR5 that holds 30 kg stretched out, without the limits as an effect."""
     arm = rd.load("ur5").with_(payload=rd.Payload("tool0", 30.0))
-    hold = rd.control.PDGravity(arm, rd.control.hold([0.0] * 6), 0.0, 0.0)
+    hold = rd.control.PDGravity(arm, rd.control.hold([0.0] * 6), kp=0.0, kd=0.0)
     run = rd.simulate(arm, [0.0] * 6, duration_s=0.05, controller=hold, estimate_error=False)
     over = np.abs(run.u[-1]) > arm.effort_limit
     with opened(browser, rd.replay(run)) as view:

@@ -21,7 +21,7 @@ ARM, Q = rd.load("planar_2r"), np.array([0.4, -0.7])
 def batch(fast: float) -> rd.Rollouts:
     """Runs of other starts and gains; with `fast`, in [rad/s], three of them diverge."""
     reference = rd.control.quintic(Q, Q + 0.5, 0.1)
-    controller = rd.control.PD(reference, 40.0, [4.0, 3.0])
+    controller = rd.control.PD(reference, kp=40.0, kd=[4.0, 3.0])
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([0.3, 0.1])])
     setup = rd.Setup(plant, Q, duration_s=0.2, controller=controller, method="RK4", step_s=2e-3)
     q0 = Q + 0.3 * np.random.default_rng(3).normal(size=(COUNT, 2))

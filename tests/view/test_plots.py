@@ -166,9 +166,9 @@ def test_the_effort_limit_that_acts_is_shown_rather_than_that_of_the_file(by: st
     kp, kd = rd.control.gains_from(np.diag(arm.M(q)), 20.0)
     target = rd.control.hold(q + 0.1)
     limited = rd.control.PID(
-        target, kp, kd, kp, effort_limit=acting if by == "controller" else np.minimum(acting, 12.0)
+        target, kp=kp, ki=kd, kd=kp, effort_limit=acting if by == "controller" else np.minimum(acting, 12.0)
     )
-    controller = rd.control.PD(target, kp, kd) if by == "plant" else limited
+    controller = rd.control.PD(target, kp=kp, kd=kd) if by == "plant" else limited
     effects = [] if by == "controller" else [rd.effects.EffortLimit(acting)]
     short = rd.simulate(rd.Plant(arm, effects), q0=q, duration_s=0.05, controller=controller)
     smaller = np.minimum(acting, 12.0) if by == "both" else acting

@@ -66,11 +66,11 @@ class Store:
 
     Attributes:
         folder: Absolute path; the first `save` creates it with access for you alone.
-        most_bytes: Size limit, in [bytes]; above it the least recently used entries are removed.
+        max_bytes: Size limit, in [bytes]; above it the least recently used entries are removed.
     """
 
     folder: Path
-    most_bytes: int = 512 * 2**20
+    max_bytes: int = 512 * 2**20
 
     def load(self, key: str) -> bytes | None:
         """Return the payload saved under `key`; None unless an intact one exists that you own (a bad one is removed).
@@ -94,7 +94,7 @@ class Store:
         path = self._path(key)
         label = " ".join(shorten(about, 200).split())  # one line
         entry = _sealed(f"{key}\n{label}\n".encode("utf-8", "replace") + payload)
-        if len(entry) > self.most_bytes:
+        if len(entry) > self.max_bytes:
             return
         why = _objection(self.folder)
         try:
@@ -138,7 +138,7 @@ class Store:
             if time.time() - status.st_mtime > _ABANDONED_S:
                 _remove(path)
         files = self._files()
-        excess = sum(status.st_size for _, status in files) - self.most_bytes
+        excess = sum(status.st_size for _, status in files) - self.max_bytes
         for path, status in reversed(files):
             if excess > 0 and path != newest and _remove(path):
                 excess -= status.st_size

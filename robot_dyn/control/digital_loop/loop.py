@@ -50,18 +50,18 @@ class Loop(Controller):
     """A sampled controller with delays, and blocks between it and the arm.
 
     Delays are in periods T. The controller computes at t_k = k T, from the reference at that time and the measurement
-    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T. Measurements before the start are
-    the initial position and velocity, and the torque is 0 until the first command acts. The actuation of a run is the
-    acting torque.
+    at t_k − τ_m T; its torque acts from t_k + τ_u T, with τ_m = measurement_delay_periods and τ_u =
+    actuation_delay_periods. Measurements before the start are the initial position and velocity, and the torque is 0
+    until the first command acts. The actuation of a run is the acting torque.
 
     Attributes:
         controller: A sampled controller; its period is the period of the loop.
         position: Blocks of the measured position, in the order from the joints to the controller.
         velocity: Blocks of the measured velocity; if the first is `Differences`, its input is the output of `position`.
         actuation: Blocks of the torque, in the order from the controller to the joints.
-        measurement_delay: Delay of position and velocity, in periods, not negative.
-        actuation_delay: Delay of the torque, from the start of its computation, in periods, not negative.
-        seed: Seed of the noise, an integer.
+        measurement_delay_periods: Delay of position and velocity, in periods, not negative.
+        actuation_delay_periods: Delay of the torque, from the start of its computation, in periods, not negative.
+        noise_seed: Seed of the noise, an integer.
         run: Number of the run, which selects its noise; `rollouts` counts up from it.
 
     Raises:
@@ -74,9 +74,9 @@ class Loop(Controller):
     position: tuple[Block, ...] = ()
     velocity: tuple[Block, ...] = ()
     actuation: tuple[Block, ...] = ()
-    measurement_delay: float = 0.0
-    actuation_delay: float = 0.0
-    seed: int = 0
+    measurement_delay_periods: float = 0.0
+    actuation_delay_periods: float = 0.0
+    noise_seed: int = 0
     run: int = 0
     period_s: float = field(init=False, default=0.0)
 
@@ -87,9 +87,9 @@ class Loop(Controller):
         object.__setattr__(self, "period_s", self.controller.period_s)
         for line in LINES:
             object.__setattr__(self, line, _blocks(line, getattr(self, line)))
-        for name in ("measurement_delay", "actuation_delay"):
+        for name in ("measurement_delay_periods", "actuation_delay_periods"):
             object.__setattr__(self, name, delay(name, getattr(self, name)))
-        for name in ("seed", "run"):
+        for name in ("noise_seed", "run"):
             object.__setattr__(self, name, integer(name, getattr(self, name), most=2**63 - 1, error=ControlError))
         super().__post_init__()
         self._check_blocks(self.period_s)
@@ -153,7 +153,7 @@ class Loop(Controller):
 
     @property
     def noise_key(self) -> tuple[int, int]:
-        return self.seed, self.run
+        return self.noise_seed, self.run
 
     def of_run(self, run: int) -> Loop:
         return with_values(self, {"run": self.run + run})
@@ -165,7 +165,7 @@ class Loop(Controller):
     @cached_property
     def ticks(self) -> tuple[Instant, ...]:
         """The instants of each period, the first at its start."""
-        return instants(self.measurement_delay, self.actuation_delay)
+        return instants(self.measurement_delay_periods, self.actuation_delay_periods)
 
     @property
     def differs(self) -> bool:
@@ -177,15 +177,15 @@ class Loop(Controller):
         """Slices of the states in z, by name."""
         n, several = self.n, len(self.ticks) > 1
         measured = n if self.differs else 2 * n
-        whole = int(self.measurement_delay), int(self.actuation_delay)
+        whole = int(self.measurement_delay_periods), int(self.actuation_delay_periods)
         named = {f"{line}.{i}": block for line, i, block in self.blocks}
         sizes = {"controller": self.controller.state_size, "instant": several, "begun": 0}
-        sizes["sample"] = measured * (self.measurement_delay % 1.0 > 0)
+        sizes["sample"] = measured * (self.measurement_delay_periods % 1.0 > 0)
         sizes["past"] = measured * whole[0]
         sizes |= {name: block.state_size(n) for name, block in named.items() if not block.random}
         sizes["begun"] = any(sizes[name] for name in sizes if name not in ("controller", "instant"))
         sizes["coming"] = n * whole[1]
-        sizes["computed"] = n * (self.actuation_delay % 1.0 > 0)
+        sizes["computed"] = n * (self.actuation_delay_periods % 1.0 > 0)
         sizes["acting"] = n * several
         sizes |= {name: block.state_size(n) for name, block in named.items() if block.random}
         ends = np.cumsum([0, *sizes.values()]).tolist()
@@ -214,7 +214,7 @@ class Loop(Controller):
     def settled(self, t: float, q: Array, v: Array, z: Array) -> Array:
         inside = self.controller.settled(t, q, v, z)
         z = np.concatenate([inside, np.zeros(self.state_size - len(inside))])
-        late = ceil(self.measurement_delay) + ceil(self.actuation_delay) + 2
+        late = ceil(self.measurement_delay_periods) + ceil(self.actuation_delay_periods) + 2
         for k in range(-self.cycle * ceil(late / self.cycle), 0):
             for part in self.instants:
                 s = (k + part) * self.period_s
@@ -247,7 +247,7 @@ def _tick(loop: Loop, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Ar
     u = states["acting"]
     if at.computes:
         u = _computed(loop, t, fresh, states)
-        if loop.actuation_delay % 1.0:
+        if loop.actuation_delay_periods % 1.0:
             u, states["computed"] = states["acting"], u
     elif at.acts:
         u = states["computed"]
@@ -318,8 +318,8 @@ def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant,
     parts = sorted({0.0, measured, acted})
     if (np.diff([*parts, 1.0]) < _LEAST).any():
         raise ControlError(
-            f"measurement_delay = {measurement_delay!r} and actuation_delay = {actuation_delay!r} give two instants"
-            f" less than {_LEAST:g} periods apart; let them coincide, or move them further apart"
+            f"measurement_delay_periods = {measurement_delay!r} and actuation_delay_periods = {actuation_delay!r} give"
+            f" two instants less than {_LEAST:g} periods apart; let them coincide, or move them further apart"
         )
     return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
 

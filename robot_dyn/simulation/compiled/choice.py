@@ -13,6 +13,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached
 from robot_dyn.foundations.waiting import log_if_slow
 from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.compiled.cache import (
     existing,
     identify,
@@ -124,7 +125,7 @@ def _has_loop(setup: Setup) -> bool:
     from robot_dyn.simulation.compiled.loop import loop_of
 
     method, holds = setup.method, bool(setup.plant.equation_of_motion.set_valued)
-    return method.plain and loop_of(method, setup.finds_events, holds=holds).is_kept()
+    return isinstance(method, PlainMethod | Adaptive) and loop_of(method, setup.finds_events, holds=holds).is_kept()
 
 
 def _evaluations(setup: Setup, size: int) -> float:

@@ -205,7 +205,9 @@ class MachineCode:
     @cached_property
     def in_python(self) -> Functions:
         """The functions as Python functions."""
-        return Functions(*(_callable(address) if address else 0 for address in self.code.addresses))
+        return Functions(
+            *(_callable(address) if isinstance(address, int) and address else 0 for address in self.code.addresses)
+        )
 
     def is_kept(self) -> bool:
         """Return True if the machine code and its loop are in this process or in the store."""

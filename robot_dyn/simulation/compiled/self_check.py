@@ -17,6 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
+from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.model.right_angles import models_in_full
 from robot_dyn.simulation.compiled.cache import robot_to_compile
 from robot_dyn.simulation.compiled.machine_code import STEP, MachineCode, States
@@ -168,7 +169,7 @@ def _results_of_step(code: MachineCode, at: _Evaluated) -> Pairs:
     n = equation.plant.dynamics.n
     x = np.vstack([at.y, np.full((1, W), _LENGTH), np.zeros((n, W))])
     out = np.empty((m + 2 * n + 1 + code.code.programs.results("problem"), W))
-    code.in_python.step(at.t, x, at.p, at.run_parameters, out)
+    evaluate(code.in_python.step, at.t, x, at.p, at.run_parameters, out)
     for lane in range(min(W, _LANES)):
         theirs = stepped(equation, at.t, x[:, lane], at.held(equation, lane))
         yield out[:m, lane], theirs[:m]

@@ -11,6 +11,7 @@ import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached
+from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
@@ -56,18 +57,19 @@ def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[
         t: Time reached, in [s].
         step_s: Longest step of the run, in [s]; None to find it from the setup.
     """
-    if setup.method.controls_error or setup.method.nonsmooth or setup.equation.canonical:
+    method = setup.method
+    if isinstance(method, Adaptive) or method.nonsmooth or setup.equation.canonical:
         return ()
     equation, step = setup.equation, setup.taken_step_s if step_s is None else step_s
     y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
-        linear = setup.method, jacobian(equation, 0.0, y, held), len(setup.q0)
+        linear = method, jacobian(equation, 0.0, y, held), len(setup.q0)
         if not excess_rate(*linear)(step) * t > log(EXPLAINS):
             return ()
         limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
-    facts = motion.facts | {"method": setup.method.name, "step_s": below(limit)}
+    facts = motion.facts | {"method": method.name, "step_s": below(limit)}
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 

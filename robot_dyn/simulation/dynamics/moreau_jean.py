@@ -13,14 +13,14 @@ import numpy as np
 
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.set_valued import SetValued, impulses_of, in_a_step
-from robot_dyn.foundations.arithmetic import Array, Scalar
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.convex import PASSES, newton
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError
 from robot_dyn.integrate.time_stepping import problem_rows
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 
-def problem(equation: StateEquation, t: Scalar, x: Array, held: Array | None) -> Array:
+def problem(equation: StateEquation, t: float, x: Array, held: Array | None) -> Array:
     """Return the numbers of the convex problem of a step, from `Problem.M` on.
 
     Args:

@@ -275,7 +275,7 @@ class StateEquation(Caching):
         reached = equation.applied(u, z[self.state_size :], bounds)[1]
         return [call(self.controller.demand, *state) if k == CONTROLLER else reached[k] for k in parts]
 
-    def switching(self, t: float, q: Array, v: Array) -> list[Scalar]:
+    def switching(self, t: float, q: Array, v: Array) -> list[float | np.floating]:
         """Return the values of the user-defined events, in floats or symbols."""
         return [call(event.function, t, q, v) for event in self.events]
 

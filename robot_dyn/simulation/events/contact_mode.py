@@ -21,7 +21,7 @@ from robot_dyn.simulation.events.event_log import EventLog
 
 
 class ContactLaws(NamedTuple):
-    """The laws of N coordinates, n joints and then the gaps; S effects have stops, and each contains the ends of gaps.
+    """The laws of N coordinates, n joints and then the gaps; S effects have stops, each with the ends of gaps.
 
     Tables have at least two columns, also for N = 1, because machine code has a type for arrays of one column.
 
@@ -110,7 +110,7 @@ class ContactMode(NamedTuple):
         places: Places of the mode among the run parameters.
         held, direction: See `Mode`, of all coordinates, (N,).
         contact: See `Mode`, (n,).
-        run_parameters: Parameters of the equation in which nothing is held and parts switch by themselves, (O, 1).
+        run_parameters: Parameters of the equation in which no joint is held and parts switch within steps, (O, 1).
         held_actuation: Number of leading run parameters that are the actuation in zero-order hold.
         impacts, strikes: Times of the latest impacts, and 1 for each coordinate that struck in them, (I,) and (I, N).
         impact_count: Number of these impacts, (1,).

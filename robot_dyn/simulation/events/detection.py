@@ -2,7 +2,7 @@
 
 A coordinate of y is enclosed by Hermite's polynomial through values and rates at both ends of the step, in Bernstein's
 form. Any other function is judged by its latest changes. [Shampine, Thompson 2000] Steps in lock step have no dense
-output to locate an event with: a run that may pass a level is repeated by itself.
+output to locate an event: a run that may pass a level is repeated as a single run.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robot_dyn.integrate.integrator import States
 from robot_dyn.integrate.primitives import copy, evaluate
 from robot_dyn.simulation.dynamics.loop_state import Functions
 
-FASTEST = 1e6  # [rad/s] or [m/s]: error control would follow an exploding state without end
+FASTEST = 1e6  # [rad/s] or [m/s]: error control would follow an exploding state forever
 _MARGIN = 4.0  # times the change of a limited actuation in a step, or in the one before
 _STEADY = 0.5  # of a rate: a smaller change of it within a step does not turn it
 
@@ -35,8 +35,8 @@ class LaneEvents(NamedTuple):
         rate, next_rate: y' at the start and at the end of a step, (m, W).
         values, next_values: Values of the F functions there, (F, W).
         change: Their change in the step before, (F, W).
-        until: Start of the first step in which a run may pass a level; inf if it passes none, (W,), in [s].
-        left: Number of runs that have passed none, (1,).
+        until: Start of the first step in which a run may pass a level; inf without one, (W,), in [s].
+        left: Number of runs that are not marked, (1,).
     """
 
     rows: Array
@@ -54,9 +54,15 @@ class LaneEvents(NamedTuple):
 
 
 class DetectingWork(NamedTuple):
-    """The arrays of a step in lock step: those of the method, with K its rates; and the switching functions."""
+    """The arrays of a step in lock step.
 
-    method: Any
+    Attributes:
+        method: Arrays of the method, see `Stepper.work`.
+        K: Rates of the method, the latest last.
+        events: The switching functions.
+    """
+
+    method: NamedTuple
     K: Array
     events: LaneEvents
 

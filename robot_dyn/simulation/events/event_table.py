@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import rate_coefficients, value
 from robot_dyn.integrate.primitives import between, evaluate
-from robot_dyn.simulation.dynamics.loop_state import Lanes, LoopConfig
+from robot_dyn.simulation.dynamics.loop_state import Function, Lanes, LoopConfig
 from robot_dyn.simulation.events.detection import coordinate_nears, enclosure, enclosure_of_position, function_nears
 
 SCANS = 11  # evaluations of each function of the table in a step that is scanned, see `first_event`
@@ -20,7 +20,7 @@ NEAR = 1e-4  # of a step: for the slope of a function
 class EventTable(NamedTuple):
     """Switching functions: E coordinates of y, or rates of these, and G functions of (t, y), each with a level.
 
-    The coordinates are first those of thresholds, then the guards of the contact mode, of which some are active. The
+    The coordinates are first those of thresholds, then the guards of the contact mode, some of them active. The
     functions are first those of thresholds of the actuation, then user-defined events.
 
     Attributes:
@@ -31,7 +31,7 @@ class EventTable(NamedTuple):
         active: True if the coordinate may cause an event, (E,).
         thresholds, guards: Number of thresholds of coordinates, and of guards; E is their sum.
         zeroed: Entries of y that are set to 0 after each step: only their rates matter.
-        functions: The function that writes the F values, for `evaluate`.
+        functions: Function for `evaluate` that writes the F values.
         user_defined: Number of user-defined events, which are scanned in each step.
         values: The latest values, (F, 1).
         previous, change: Values at the start of a step, and their change in the step before, (F,).
@@ -48,7 +48,7 @@ class EventTable(NamedTuple):
     thresholds: int
     guards: int
     zeroed: Array
-    functions: Any
+    functions: Function | None
     user_defined: int
     values: Array
     previous: Array
@@ -58,6 +58,14 @@ class EventTable(NamedTuple):
     coefficients: Array
     stack: Array
     scanned: Array
+
+
+class DenseWork(Protocol):
+    """The arrays of a method with dense output that events read: rates K, the rate `last` at the end, and F."""
+
+    K: Array
+    last: Array
+    F: Array
 
 
 def coordinates(table: EventTable) -> int:
@@ -78,9 +86,9 @@ def start_table(table: EventTable, lanes: Lanes, t: float) -> None:
             table.previous[i], table.change[i] = table.values[i, 0], np.inf
 
 
-def coordinate_approaches(table: EventTable, lanes: Lanes, config: LoopConfig, work: Any, h: float) -> bool:
+def coordinate_approaches(table: EventTable, lanes: Lanes, config: LoopConfig, work: DenseWork, h: float) -> bool:
     """Return True if a coordinate may pass its level in a step, judged by Hermite's polynomial; rates always may."""
-    n = 0 if config.canonical else config.n  # p' is no acceleration
+    n = 0 if config.canonical else config.n  # p' is not an acceleration
     y, after, first, last = lanes.y, lanes.after, work.K[0], work.last
     for e in range(coordinates(table)):
         if not table.active[e]:
@@ -150,8 +158,8 @@ def same_sides(table: EventTable, lanes: Lanes, t: float) -> bool:
     return True
 
 
-def correction(table: EventTable, lanes: Lanes, work: Any, event: int, t: float, h: float, whole: float) -> float:
-    """Return Newton's correction of a step whose end is to be a root of a switching function.
+def correction(table: EventTable, lanes: Lanes, work: DenseWork, event: int, t: float, h: float, whole: float) -> float:
+    """Return Newton's correction of the length of a step that should end at the root of a switching function, in [s].
 
     Args:
         table: The switching functions.

@@ -26,7 +26,7 @@ from robot_dyn.simulation.events.contact_mode import (
 from robot_dyn.simulation.events.event_log import EventKind, log_event
 
 _ACCUMULATED = 1e-6  # [s] for all remaining impacts: ending them early has an effect of second order only
-_CROWDED = 20  # impacts within that time: they continue forever, whatever the restitution
+_CROWDED = 20  # impacts within that time: they continue forever, for any restitution
 
 
 def strike(f: Functions, t: float, y: Array, p: Array, mode: ContactMode, s: int) -> bool:

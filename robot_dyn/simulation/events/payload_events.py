@@ -74,14 +74,14 @@ def _transferred(
     q, v = y[:n], y[n : 2 * n]
     place = {name: first + k for k, name in enumerate(equation.sources)}
     works = [first + k for k in equation.of_payloads]
-    held, happened = list(was), []
+    carried, happened = list(was), []
 
     def energies(v: np.ndarray) -> np.ndarray:
-        of = _carrying(equation, tuple(held)).equation_of_motion
+        of = _carrying(equation, tuple(carried)).equation_of_motion
         return np.array(of.energies(np.array([t]), q[None], v[None]))[:, 0]
 
     def momentum() -> np.ndarray:
-        return carrying(equation.plant, tuple(held)).dynamics.momentum(q, v)
+        return carrying(equation.plant, tuple(carried)).dynamics.momentum(q, v)
 
     def report(k: int, event: str, direction: int) -> None:
         name = f"payload on {payloads[k].payload.frame} {event}"
@@ -91,23 +91,23 @@ def _transferred(
     dropped = [k for k in changes if was[k]]
     caught = [k for k in changes if now[k] and payloads[k].at_rest]
     for k in dropped:
-        before, held[k] = energies(v).sum(), False
+        before, carried[k] = energies(v).sum(), False
         y[works[k]] += energies(v).sum() - before
         report(k, "dropped", -1)
     if caught:
         (kinetic, potential), p = energies(v), momentum()
         for k in caught:
-            held[k] = True
+            carried[k] = True
             after = energies(v)[1]
             y[works[k]] += after - potential
             potential = after
-        v[:] = acceleration(carrying(equation.plant, tuple(held)).dynamics.M(q), p, names)
+        v[:] = acceleration(carrying(equation.plant, tuple(carried)).dynamics.M(q), p, names)
         y[place[PICK_UP]] += energies(v)[0] - kinetic
         for k in caught:
             report(k, "picked up at rest", 1)
     for k in changes:
-        if now[k] and not held[k]:
-            before, held[k] = energies(v).sum(), True
+        if now[k] and not carried[k]:
+            before, carried[k] = energies(v).sum(), True
             y[works[k]] += energies(v).sum() - before
             report(k, "picked up at the speed of the link", 1)
     return y, happened

@@ -14,13 +14,14 @@ from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.integrate.bernstein import work_array
 from robot_dyn.simulation.dynamics.event import Occurrence
+from robot_dyn.simulation.dynamics.loop_state import Function
 from robot_dyn.simulation.dynamics.state_equation import CONTROLLER, StateEquation
 from robot_dyn.simulation.events.contacts import Contacts
 from robot_dyn.simulation.events.event_table import ROUNDING, SCANS, EventTable
 from robot_dyn.simulation.events.mode_change import write_guards
 
-_MOST = 256  # equations that are cached, each of the sides of all thresholds
-Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
+_MOST = 256  # cached equations, one for each set of sides of all thresholds
+Quantity = tuple[int, bool]  # a joint, and True for its actuation, False for its motion
 
 
 @final
@@ -28,9 +29,9 @@ class Switching:
     """The switching functions of a run: of coordinates, of the actuation, and user-defined ones.
 
     Args:
-        equation: The state equation, of parts that switch by themselves, and with user-defined events.
-        dropped: Quantities whose thresholds are ignored: there the parts switch by themselves.
-        contacts: The joints that may be held; None if nothing may hold a joint.
+        equation: The state equation, with user-defined events; its parts switch within steps.
+        dropped: Quantities whose thresholds are ignored, so that the parts switch within steps.
+        contacts: The joints that may be held; None if no effect can hold a joint.
 
     Attributes:
         thresholds: Thresholds of coordinates, each once, and then those of the actuation, part by part.
@@ -82,7 +83,7 @@ class Switching:
         """The levels of the thresholds."""
         return np.array([threshold.level for threshold in self.thresholds])
 
-    def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> EventTable:
+    def at(self, t: float, y: np.ndarray, degree: int, functions: Function | None, held: Array | None) -> EventTable:
         """Return the table of switching functions, on their sides of a state and of the contact mode.
 
         Args:
@@ -142,7 +143,7 @@ class Switching:
         if threshold.state is None or part is None:
             return threshold.joint + self._n * threshold.of_velocity
         if part not in self.equation.equation_of_motion.states:
-            raise EffectError(f"{threshold.name}: is a threshold of a state, and what declares it has none")
+            raise EffectError(f"{threshold.name}: is a threshold of a state, and the part that declares it has none")
         first = 2 * self._n + self.equation.state_size
         return first + self.equation.equation_of_motion.states[part].start + threshold.state
 

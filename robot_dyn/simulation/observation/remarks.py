@@ -156,9 +156,9 @@ class Remark:
         kind: Its subject.
         joint: Name of the joint, or of the effect or frame that it concerns.
         quantity: "q", "v", "u" or "power": the quantity of value and limit.
-        start: Time of its start, in [s].
-        duration: Total duration, in [s].
-        at: Time of the value, in [s].
+        start_s: Time of its start, in [s].
+        duration_s: Total duration, in [s].
+        at_s: Time of the value, in [s].
         value: The extreme; for chatter the amplitude, half of the change of actuation between two ticks.
         limit: Number to compare with: a limit, or the extreme of the samples; None for chatter.
         facts: Further numbers and names of its sentence.
@@ -170,9 +170,9 @@ class Remark:
     kind: RemarkKind
     joint: str
     quantity: str
-    start: float
-    duration: float
-    at: float
+    start_s: float
+    duration_s: float
+    at_s: float
     value: float
     limit: float | None
     facts: dict[str, float | str] = field(default_factory=dict, hash=False)
@@ -183,8 +183,8 @@ class Remark:
     def fields(self) -> Facts:
         """The numbers and names of its sentence."""
         own: dict[str, float | str] = {
-            "joint": self.joint, "quantity": self.quantity, "start": self.start, "duration": self.duration,
-            "at": self.at, "value": self.value,
+            "joint": self.joint, "quantity": self.quantity, "start": self.start_s, "duration": self.duration_s,
+            "at": self.at_s, "value": self.value,
         }  # fmt: skip
         limit = {} if self.limit is None else {"limit": self.limit, "bound": abs(self.limit)}
         return own | limit | self.facts

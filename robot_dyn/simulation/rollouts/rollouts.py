@@ -56,7 +56,7 @@ def rollouts(
     cuts: bool = True,
     numbers: ArrayLike | None = None,
     threads: int | None = None,
-    most_bytes: int = MOST_BYTES,
+    max_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Rollouts:
@@ -88,7 +88,7 @@ def rollouts(
         numbers: Numbers of the runs, which determine their noise, (B,); by default 0 to B − 1. The bits of a run depend
             on its number, start and parameters, not on the other runs.
         threads: Number of threads; None for all processors.
-        most_bytes: Refuse to record more than this.
+        max_bytes: Refuse to record more than this.
         on_progress: Called with the mean time that the runs have reached, in [s], some ten times a second; with a
             record period of 0 it grows as tiles of 64 runs end.
         **options: Options of `simulate`, except `estimate_error` and `accuracy`, which have no effect here: no error is
@@ -105,13 +105,13 @@ def rollouts(
         The runs, in the order given. After Ctrl-C they contain the samples recorded up to then.
 
     Raises:
-        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
+        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `max_bytes`.
         TraceError: If a part of the setup cannot be compiled; the message names it.
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
     if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
         setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
-    most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
+    max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1)
     if not setup.method.plain:
         raise QueryError(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
@@ -120,7 +120,7 @@ def rollouts(
     if vary is not None and not (isinstance(vary, Mapping) and all(isinstance(name, str) for name in vary)):
         raise QueryError(f"vary must give values by name, such as {{'kp': …}}, got {shown(vary)}")
     batch = batch_of(setup, q0, v0, vary or {}, record, numbers)
-    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
+    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), max_bytes, on_progress)
 
 
 def batch_of(
@@ -175,14 +175,14 @@ def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
 
 
 def run_batch(
-    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
+    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, max_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
     """Return the rollouts of a batch with thresholds `passed`."""
     setup, why = batch.setup, batch.why_one_by_one
     if not cuts and why:
         raise QueryError(f"cuts=False: {why}, so the runs are not in lock step; leave it out")
-    check_batch(setup, len(batch), sum(batch.sizes.values()), most_bytes)
+    check_batch(setup, len(batch), sum(batch.sizes.values()), max_bytes)
     cut = (
         passed is not None or setup.finds_events
     )  # samples are then interpolated within steps, which lock step does not support

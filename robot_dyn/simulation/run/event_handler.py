@@ -13,6 +13,7 @@ from robot_dyn.foundations.errors import NotFiniteError, OverflowedError, RobotD
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.foundations.values import cached, copied
 from robot_dyn.integrate.bernstein import work_array
+from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.integrate.step_control import StepControl
 from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions
@@ -35,11 +36,11 @@ _MOST_CHANGES = 1000  # of the mode within the part _BRIEF of a run: no motion b
 
 @final
 class EventHandler:
-    """The switching functions of a run, and what happens at events.
+    """The switching functions of a run, and the changes of its equation and state at events.
 
     Args:
         state: The state of the run.
-        control: Control of the steps, whose next length is forgotten where the equation changes.
+        control: Control of the steps; it chooses a new first step if the equation changes.
         degree: Degree of the dense output.
         thresholds: True to find the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to give up where events accumulate, instead of ending the run.
@@ -47,8 +48,8 @@ class EventHandler:
     Attributes:
         switching: The switching functions, and the contacts.
         event_table: The switching functions as arrays.
-        events: The events, as the loop takes them.
-        error: Why the rate had no value in a trial step, or None.
+        events: The events as data of the loop.
+        error: Error of the rate in the latest trial step that failed, or None.
     """
 
     def __init__(self, state: RunState, control: StepControl, degree: int, thresholds: bool, may_replace: bool) -> None:
@@ -88,7 +89,7 @@ class EventHandler:
         if index < len(thresholds):
             self._add(self.switching.occurrence(index, t, y, side))
             if self.state.setup.method.needs_jacobian:
-                self.control.next_h[0] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
+                self.control.next_h[0] = 0.0  # an L-stable step damps fast motions: a short first step resolves them
             if self._chatters():
                 self._drop(thresholds[index])
             self._apply_mode()
@@ -100,7 +101,7 @@ class EventHandler:
         return event.name if event.terminal else None
 
     def after_mode(self, ended: Ended, t: float, y: np.ndarray) -> Accumulation | None:
-        """Continue after the end of a mode; return why the run gives up, if it does. DivergedError ends the run."""
+        """Continue after the end of a mode; return `Accumulation` if the run gives up. DivergedError ends the run."""
         contacts = self.switching.contacts
         assert contacts is not None
         if ended is Ended.UNSETTLED:
@@ -113,7 +114,7 @@ class EventHandler:
         return None
 
     def change_payload(self) -> None:
-        """Pick up or drop payloads at the start of the segment, and continue in a mode of its own."""
+        """Pick up or drop payloads at the start of the segment, and compute the mode after that."""
         state, s = self.state, self.state.segment
         t = float(state.table.starts[s])
         self._add(*state.change_payload())
@@ -147,14 +148,14 @@ class EventHandler:
         return self.switching.occurrence(int(number), t, y, side)
 
     def _apply_mode(self) -> None:
-        """Take the functions of the sides on which the switching functions are, and of the contact mode."""
+        """Set the functions and parameters for the current sides of the switching functions and the contact mode."""
         state, switching = self.state, self.switching
         if switching.thresholds or switching.dropped or state.payloads.any:
             on_sides = switching.on(self.event_table.sides)
             functions, state.in_python, parameters, by_numbers = state.engine.evaluated(on_sides, state.watch)
             state.functions = functions._replace(bodies=self._bodies)
             state.set_parameters(parameters)
-            if by_numbers:  # else functions change with the sides
+            if by_numbers:  # otherwise the functions change, not only their parameters
                 add_region(self.regions, switching.of_thresholds(self.event_table.sides), parameters)
         contacts = switching.contacts
         self.events = Events(self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode)
@@ -164,18 +165,18 @@ class EventHandler:
             state.functions = self._lenient(state.functions)
 
     def _forget_regions(self) -> None:
-        """Forget the parameters in regions between thresholds."""
-        state, asked = self.state, [(event.direction, event.terminal) for event in self.state.setup.events]
-        directions, terminal = np.array(asked, float).reshape(-1, 2).T
+        """Clear the cached parameters of the regions between thresholds."""
+        state, rules = self.state, [(event.direction, event.terminal) for event in self.state.setup.events]
+        directions, terminal = np.array(rules, float).reshape(-1, 2).T
         count, parameters = len(self.switching.thresholds), len(state.lanes.run_parameters) - state.config.held
         self.regions = regions_of(count, parameters, directions.copy(), terminal > 0, self.log)
 
     def _lenient(self, functions: Functions) -> Functions:
-        """Return Python functions whose rate is nan where a trial step goes too far: a shorter one is tried."""
+        """Return Python functions whose rate is nan if it overflows, so that error control tries a shorter step."""
 
         def rate(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
             try:
-                functions.rate(t, y, p, run_parameters, out)
+                evaluate(functions.rate, t, y, p, run_parameters, out)
             except (OverflowedError, NotFiniteError) as error:
                 self.error, out[...] = error, np.nan
 
@@ -190,7 +191,7 @@ class EventHandler:
     def _drop(self, threshold: Threshold) -> None:
         """Ignore the thresholds of a joint from now on, because steps would not advance."""
         last = self.state.events[-1]
-        self.state.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
+        self.state.events.append(replace(last, name=f"{last.name} chatters, and is ignored from now on"))
         dropped = self.switching.dropped | {(threshold.joint, threshold.of_actuation)}
         self.switching = Switching(self.state.equation, dropped, self.switching.contacts)
         self._forget_regions()
@@ -207,9 +208,9 @@ class EventHandler:
             raise self._unsettled(t, contacts)
 
     def _accumulated(self, t: float, y: np.ndarray, mode: ContactMode, joint: str) -> Accumulation:
-        """Return why another method should make the run; DivergedError if none may."""
+        """Return `Accumulation` if time stepping may continue the run; else raise DivergedError."""
         first = float(mode.changes[mode.change_count[0] % len(mode.changes)])
-        span = float(np.ptp(mode.changes))  # a step that was taken back may have noted a later one
+        span = float(np.ptp(mode.changes))  # a rejected step may have stored a later time
         motion = self.state.equation.equation_of_motion
         excludes_time_stepping = motion.payloads or motion.drives
         if excludes_time_stepping or not self.may_replace:
@@ -221,7 +222,7 @@ class EventHandler:
         return Accumulation(joint, first, t, speed, len(mode.changes), span)
 
     def _unsettled(self, t: float, contacts: Contacts) -> DivergedError:
-        """Return the end of a run whose contact problem has no solution that the solver finds."""
+        """Return the error that ends a run if the solver finds no solution of the contact problem."""
         work = contacts.mode.work
         error = not_found(work.M_all[:, : len(work.load)], work.load)
         return self.state.watch.diverged(Reason.CANNOT_EVALUATE, t, self.state.y, error=str(error))
@@ -233,7 +234,7 @@ class EventHandler:
 
 
 def switching_of(setup: Setup) -> Switching:
-    """Return where the equation of a setup switches, without contacts and payloads."""
+    """Return the switching functions of a setup without contacts and payloads."""
     return Switching(setup.equation)
 
 

@@ -101,7 +101,9 @@ def event_loop(
                         reject(loop, events.table, control, h, e)
                         continue
                     control.end[0] = position.time[0] + (h + rest)
-                    control.next_h[0] = max(control.next_h[0], abs(control.h[0]))  # not the error shortened the step
+                    control.next_h[0] = max(
+                        control.next_h[0], abs(control.h[0])
+                    )  # the event, not the error, shortened the step
                     events.table.sides[event] = -events.table.sides[event]
                 record_step(f, c, work, loop, control, h, end, has_dense and event < 0)
                 finish_step(f, work, loop, events.table, control, event, rest)
@@ -160,8 +162,8 @@ def event_loop(
         """Shorten the step by Newton's iteration until it ends at the root of a switching function, minus a rest.
 
         Returns:
-            Its length; the length of the rest, over which y is linear and which the caller adds; and its error,
-            because it may pass slowly through a range that the whole step jumped over, such as friction near v = 0.
+            The length of the step; the length of the rest, over which y is linear and which the caller adds; and the
+            error of the step. The error may exceed 1 if the whole step jumped over a range, such as friction near 0.
         """
         lanes, position, t, whole = loop.lanes, loop.position, loop.position.time[0], control.h[0]
         h, e = theta * whole, 0.0

@@ -1,4 +1,4 @@
-"""Steps chosen by error control, or ended by events: the calls of `event_loop`, and what Python does between them.
+"""Steps chosen by error control, or ended by events: calls of `event_loop`, and the work of Python between them.
 
 At an event the effects change their mode: their coefficients choose the formula on the other side of a switch, so that
 the right-hand side is smooth within a step.
@@ -91,7 +91,7 @@ class EventSteps:
         return min(room, self._next_look - int(self.state.position.steps[0])) if self._next_look else room
 
     def replaced(self) -> Stiff | None:
-        """Return why a stiff method should make the run, if it should."""
+        """Return `Stiff` if a stiff method should replace the run, else None."""
         state = self.state
         if not self._next_look or state.position.steps[0] < self._next_look:
             return None
@@ -115,11 +115,11 @@ class EventSteps:
             self.handler.take_log()
 
     def judge(self, ended: Ended) -> Outcome | GivesUp | None:
-        """Handle what the loop returned for; return how the run ends, if it does. DivergedError ends it, too."""
+        """Handle the reason for which the loop returned; return the end of the run, or None, or raise DivergedError."""
         state, handler, t, y = self.state, self.handler, self.time, self.state.y
         if state.position.evaluations[0] > self.max_evaluations:
             return TooLong(int(state.position.evaluations[0]))
-        if not t <= state.setup.duration_s * (1 + 1e-9):  # of an event that was looked for in states that overflow
+        if not t <= state.setup.duration_s * (1 + 1e-9):  # time of an event in states that overflow
             samples = state.records.t[: int(state.position.sample_row[0])]
             times = [0.0, *samples, *(event.t for event in state.events)]
             t = float(max(time for time in times if time <= state.setup.duration_s))
@@ -146,7 +146,7 @@ class EventSteps:
         return None
 
     def _failure(self, ended: Ended, t: float, y: np.ndarray) -> Outcome:
-        """Return the outcome of a step that was not found."""
+        """Return the outcome if error control has failed to take a step."""
         if ended is Ended.FAST:
             return Outcome(Reason.IMPLAUSIBLE_SPEED, t, facts={"limit": 1e6})
         if (error := self.handler.error) is not None:
@@ -169,11 +169,11 @@ class EventSteps:
 
     @property
     def _equation(self) -> StateEquation:
-        """The state equation on the sides on which the switching functions are."""
+        """The state equation on the current sides of the switching functions."""
         return self.handler.switching.on(self.handler.event_table.sides)
 
     def _review_step(self) -> None:
-        """Repeat a step of a method of fixed step that was not found: DivergedError has the reason."""
+        """Repeat a failed step of a method of fixed step by the interpreted equation; DivergedError has the reason."""
         state, t, y, equation = self.state, self.time, self.state.y, self._equation
         p, functions = state.table.parameters[state.segment], interpreted(equation, state.watch)
         right_side = system(functions, equation, p, state.lanes.run_parameters[: state.config.held])

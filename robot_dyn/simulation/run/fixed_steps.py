@@ -1,7 +1,7 @@
-"""Steps of fixed length without events: the calls of `time_loop`, and what Python does between them.
+"""Steps of fixed length without events: calls of `time_loop`, and the checks in Python between them.
 
-The interpreted state equation repeats what the loop finds doubtful: a number that overflows, stages that are not found,
-energy that grows. It alone ends a run, with the reason.
+The loop returns at a doubtful step: a number overflows, stages do not converge, or energy grows. The interpreted state
+equation then repeats the step, and only it ends a run, with the reason.
 """
 
 from __future__ import annotations
@@ -68,18 +68,18 @@ class FixedSteps:
         return float(table.starts[s] + k * table.lengths[s])
 
     def room(self, budget: int) -> int:
-        """Return the number of steps before the loop must return; its records have room for all."""
+        """Return the number of steps before the loop must return: `budget`, because the records have enough rows."""
         return budget
 
     def replaced(self) -> None:
-        """Return None: no other method replaces one of fixed step."""
+        """Return None: a run of fixed steps is not replaced by one of another method."""
 
     def advance(self) -> Ended:
         """Call the loop until it returns."""
         state, (_, coefficients, work) = self.state, self.stepper
         try:
             return Ended(self.loop(state.functions, coefficients, work, state.loop, state.stop))
-        except RobotDynError as error:  # of a step; y is the state before it
+        except RobotDynError as error:  # in a step; y is the state before it
             if is_mistake(error):
                 raise
             return Ended.NEEDS_REVIEW
@@ -126,20 +126,20 @@ class FixedSteps:
         return lanes.after[:, 0].copy()
 
     def paths(self) -> tuple[Path, Path, None]:
-        """Return the states shared with companions, and again as those at the ends of steps."""
+        """Return the states shared with companions twice, because they are also the log of steps, and None."""
         records, rows = self.state.records, int(self.state.position.shared_row[0])
         path = Path(self._keys(records.shared_place[:rows]), records.shared_t[:rows], records.shared[:rows])
         return path, path, None
 
     def _keys(self, places: np.ndarray) -> np.ndarray:
-        """Return the number of steps of the setup before (segment, step)."""
+        """Return the number of steps of the setup before each place (segment, step), (k,)."""
         first = np.array([*(segment.first for segment in self.segments), self.state.setup.steps])[places[:, 0]]
         pace = np.array([*(float(segment.pace) for segment in self.segments), 1.0])[places[:, 0]]
         return first + np.rint(places[:, 1] * pace).astype(np.int64)
 
 
 def _shared(setup: Setup, pace: Fraction, segments: int) -> tuple[int, int]:
-    """Return the steps between states that companions share, and how many of these to one that is stored."""
+    """Return the number of steps between states that companions share, and the number of these per stored state."""
     few = setup.steps <= MOST_SHARED
     apart = 1 if few else 30 * ceil(setup.steps / MOST_SHARED)  # steps of 2, 3 and 5 meet at every 30th
     thin = 2 * ceil(segments / MOST_SHARED) if segments > MOST_SHARED else 1

@@ -2,9 +2,9 @@
 
     ξ = Φ⁻¹((⌊x/2¹¹⌋ + ½) / 2⁵³),   x a word of Philox at (tick, ⌊channel/4⌋, 0, 0) of the key (seed, run)
 
-No number depends on an earlier one, so that a run has the same noise alone, among others and in any thread. Plain
-functions without allocation, of integers and of operations that IEEE 754 rounds alone: interpreted and as machine code
-they give the same bits.
+A number does not depend on earlier ones, so that a run has the same noise alone, in a batch and in any thread. Plain
+functions without allocation, with integers and the operations that IEEE 754 defines exactly: interpreted and as machine
+code they return the same bits.
 
 [Salmon, Moraes, Dror, Shaw, Parallel Random Numbers: As Easy as 1, 2, 3, 2011; Wichura, Algorithm AS 241: The
 Percentage Points of the Normal Distribution, 1988]
@@ -13,13 +13,12 @@ Percentage Points of the Normal Distribution, 1988]
 from __future__ import annotations
 
 from math import frexp
-from typing import Any
 
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 
-_WORD = np.uint64
+_WORD = Word = np.uint64
 _ROUNDS = 10
 _LOW, _HALF, _ZERO = _WORD(0xFFFFFFFF), _WORD(32), _WORD(0)
 _TIMES = _WORD(0xD2E7470EE14C6C93), _WORD(0xCA5A826395121157)
@@ -65,7 +64,7 @@ def draw(y: Array, first: int, count: int, keys: Array, tick: int) -> None:
                 y[first + k + i, b] = normal(words[i])
 
 
-def philox(tick: Any, block: Any, seed: Any, run: Any) -> tuple[Any, Any, Any, Any]:
+def philox(tick: Word, block: Word, seed: Word, run: Word) -> tuple[Word, Word, Word, Word]:
     """Return the four words of Philox4x64-10 at the counter (tick, block, 0, 0) of the key (seed, run)."""
     a, b, c, d = tick, block, _ZERO, _ZERO
     for _ in range(_ROUNDS):
@@ -74,7 +73,7 @@ def philox(tick: Any, block: Any, seed: Any, run: Any) -> tuple[Any, Any, Any, A
     return a, b, c, d
 
 
-def _high(x: Any, y: Any) -> Any:
+def _high(x: Word, y: Word) -> Word:
     """Return the high word of a product."""
     x1, x0, y1, y0 = x >> _HALF, x & _LOW, y >> _HALF, y & _LOW
     middle = x1 * y0 + (x0 * y0 >> _HALF)
@@ -82,7 +81,7 @@ def _high(x: Any, y: Any) -> Any:
     return x1 * y1 + (middle >> _HALF) + (carried >> _HALF)
 
 
-def normal(word: Any) -> float:
+def normal(word: Word) -> float:
     """Return the normal deviate of a word: Φ⁻¹ of the middle of one of 2⁵³ equal parts of (0, 1), to 1e-15."""
     q = (float(word >> _DROPPED) - 2.0**52 + 0.5) * 2.0**-53  # exact, and so is the distance to the nearer end
     if abs(q) <= 0.425:
@@ -92,7 +91,8 @@ def normal(word: Any) -> float:
     return -x if q < 0.0 else x
 
 
-def _ratio(table: Any, x: float) -> float:
+def _ratio(table: tuple[tuple[float, ...], tuple[float, ...]], x: float) -> float:
+    """Return the ratio of two polynomials of degree 7 at x."""
     above, below = table[0][7], table[1][7]
     for i in range(6, -1, -1):
         above, below = above * x + table[0][i], below * x + table[1][i]

@@ -27,8 +27,8 @@ class Path:
     """States during a run, k of them.
 
     Attributes:
-        key: Steps of the run before each, (k,), by which the states of a run and of its companions are matched.
-        t: In [s], (k,).
+        key: Number of steps of the run before each state, (k,); equal keys match states of a run and its companions.
+        t: Times, in [s], (k,).
         y: States of the state equation, (k, m).
     """
 
@@ -73,13 +73,13 @@ class Records(NamedTuple):
     """The arrays in which a loop records.
 
     Attributes:
-        rows: Entries of y that samples hold, (c,).
+        rows: Entries of y that are stored in samples, (c,).
         t: Times of samples, (R,), in [s].
-        y, sampled: Those entries, and the other contents of a sample, (R, c, B) and (R, d, B).
+        y, sampled: Those entries, and the other numbers of a sample, (R, c, B) and (R, d, B).
         shared_t, shared: States that companion runs share, (S,) and (S, m).
         shared_place: Their segment and step, (S, 2).
         step_log_t, step_log: The ends of steps, (K,), and the states at the first of them, (k, m).
-        columns: See `Observer.columns`; without columns, none is written.
+        columns: See `Observer.columns`; an array without columns stores nothing.
         observation: Extremes and levels of the runs; without rows, no step is observed.
     """
 

@@ -46,7 +46,7 @@ class Run:
         on_progress: Called with the time reached, in [s], at each step or some ten times a second.
         observer: Observer of each step, or None.
         samples: True to record samples; False for a companion run.
-        max_evaluations: Evaluations of the equation of motion after which the run stops with `TooLong`.
+        max_evaluations: Number of evaluations of the equation of motion after which the run stops with `TooLong`.
         thresholds: True to end steps at the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to stop with `Stiff` or `Accumulation` if another method is better suited.
 
@@ -69,7 +69,7 @@ class Run:
         thresholds: bool = True,
         may_replace: bool = False,
     ) -> None:
-        self._on_progress, self._what = on_progress, "simulating" if samples else "estimating the error of"
+        self._on_progress, self._activity = on_progress, "simulating" if samples else "estimating the error of"
         self.seconds, self._began, self._compiling_s = 0.0, perf_counter(), engine.compiling_s()
         if not setup.finds_events:
             table = segment_table(setup, cast(Fraction, pace))
@@ -93,7 +93,7 @@ class Run:
     def run(self) -> Recording | GivesUp:
         """Run to the end, or until the run gives up for another one to replace it."""
         try:
-            with np.errstate(all="ignore"):  # what overflows ends the run
+            with np.errstate(all="ignore"):  # an overflow ends the run
                 ended = self._to_the_end()
         except DivergedError as end:
             ended = end.outcome
@@ -134,13 +134,15 @@ class Run:
                 budget = int(np.clip(budget * _PAUSE_S / max(now - called, 1e-9), first // 10, 100 * budget))
             if reports_wait and now - began > waiting.PATIENCE_S:
                 reports_wait = False
-                waiting.LOG.info("%s a run: t = %.3g of %.3g s", self._what, steps.time, self.state.setup.duration_s)
+                waiting.LOG.info(
+                    "%s a run: t = %.3g of %.3g s", self._activity, steps.time, self.state.setup.duration_s
+                )
         if self._on_progress is not None and steps.time > reported:
             self._on_progress(steps.time)
         return Outcome(Reason.END, self.state.setup.duration_s)
 
     def _advance(self, budget: int) -> Ended | Stiff:
-        """Take the given number of steps; pause when there is no room for columns of the observer or records."""
+        """Take `budget` steps, and empty the observer or enlarge the records when they are full."""
         observer, position = self.state.observer, self.state.position
         while True:
             if (replaced := self.steps.replaced()) is not None:
@@ -183,7 +185,7 @@ class Run:
 
 
 def _complete_samples(state: RunState, recording: Recording) -> None:
-    """Write the rates at samples that machine code leaves out: which joints rest, the equation must find."""
+    """Write the rates at samples by the interpreted equation where machine code leaves them nan (nonsmooth methods)."""
     m, n = state.equation.size, state.config.n
     for t, y, sampled in zip(recording.t, recording.y, recording.sampled, strict=True):
         if np.isnan(sampled[:m]).all():

@@ -21,7 +21,7 @@ _MEAN = 20  # steps whose mean length is used
 
 
 def changes_over(setup: Setup, equation: StateEquation, ends: Array, y: Array, held: Array | None) -> Stiff | None:
-    """Return why a stiff method should replace a run: stability limits its steps, and many remain; None otherwise.
+    """Return `Stiff` if stability limits the steps of a run and many steps remain, else None.
 
     Args:
         setup: The setup of the run.

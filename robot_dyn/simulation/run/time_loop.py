@@ -2,8 +2,8 @@
 
     for each segment:  tick;  for each step:  share, sample, y⁺ = step(t, y), observe, check the energy
 
-Plain functions of arrays, called as they stand with Python functions of the state equation, or as machine code with
-addresses of them. What may end a single run is checked by its driver; in lock step a run that has ended is nan.
+Plain functions of arrays: they run in Python with Python functions of the state equation, or as machine code with
+addresses of these. Python judges a doubtful step of a single run; in lock step, a run that has ended is nan.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from robot_dyn.simulation.observation.observation import observe, observe_actuat
 from robot_dyn.simulation.run.philox import draw
 from robot_dyn.simulation.run.recording import Loop, observe_step, sample, share
 
-WATCHED = 64  # steps between looks at the energy
-RUNAWAY = 1e3  # times all the energy at the start, which may come from nowhere
+WATCHED = 64  # steps between energy checks
+RUNAWAY = 1e3  # times the energy at the start and the work: a larger gain of energy has no source
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
@@ -68,7 +68,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
 
 
 def begin_lanes(functions: Functions, loop: Loop) -> None:
-    """Compute the energy at the start of runs in lock step, and observe the actuation there if it is not held."""
+    """Compute the energy at the start of runs in lock step, and observe the actuation there if it is continuous."""
     lanes, config = loop.lanes, loop.config
     copy(lanes.p, loop.table.parameters[0])
     evaluate(functions.energy, 0.0, lanes.y, lanes.p, lanes.run_parameters, lanes.energies)
@@ -80,7 +80,7 @@ def begin_lanes(functions: Functions, loop: Loop) -> None:
 
 
 def act(functions: Functions, loop: Loop, t: float, p: Array, number: int) -> bool:
-    """Apply a tick: the torque that the controller holds, and its next states.
+    """Apply a tick: write the torque for the zero-order hold and the next states of the controller.
 
     Args:
         functions: Functions of the state equation.
@@ -187,7 +187,7 @@ def erase_lanes(lanes: Lanes, config: LoopConfig) -> None:
 
 
 def observe_lanes(functions: Functions, loop: Loop, latest: Array, start: float, t: float, acted: bool) -> None:
-    """Observe q and v of each step, and the torque: each step if it is held, else every `apart` steps in lock step.
+    """Observe q, v and the torque of a step; in lock step, a torque that changes between ticks every `apart` steps.
 
     Args:
         functions: Functions of the state equation.

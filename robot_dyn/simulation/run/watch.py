@@ -42,7 +42,7 @@ def one_step(method: Integrator, system: System, t: float, y: Array, h: float, w
 
 
 def overflowed(y: Array) -> bool:
-    """Whether Σ |y| has reached LARGEST or is nan; the time loop applies the same test to runs in lock step."""
+    """Return True if Σ |y| has reached LARGEST or is nan; the time loop applies the same test to runs in lock step."""
     with np.errstate(over="ignore"):
         return not np.abs(y).sum() < LARGEST
 
@@ -56,7 +56,7 @@ def start_energies(setup: Setup) -> tuple[float, float]:
 
 @final
 class Watch:
-    """Monitor of a run: checks energy, torques and the pace of steps, and evaluates what may fail.
+    """Monitor of a run: checks energy, torques and the pace of steps, and turns errors into outcomes.
 
     Energy grows without a source if the ledger's residual exceeds 1000 times the initial energy plus work.
     """
@@ -65,7 +65,7 @@ class Watch:
         self.setup, self.equation = setup, equation
         K, V = cached(setup, start_energies)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
-        self.paced, self.looked = 0.0, 0  # time and steps at the last check of the pace
+        self.paced_t, self.paced_steps = 0.0, 0  # time and steps at the last check of the pace
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
         """Run one controller tick; raises DivergedError if the tick fails or the torque is not finite."""
@@ -79,10 +79,10 @@ class Watch:
         if self.answer(t, y, lambda: self.energy_grows(t, y)):
             raise self.diverged(Reason.ENERGY_WITHOUT_SOURCE, t, y)
 
-    def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
-        """Return the result of `ask`; raises DivergedError if the equations cannot be evaluated."""
+    def answer(self, t: float, y: Array, compute: Callable[[], T]) -> T:
+        """Return the result of `compute`; raises DivergedError if the equations cannot be evaluated."""
         try:
-            return ask()
+            return compute()
         except IntegrationError as error:  # the message already suggests a remedy
             facts: dict[str, float | str] = {"error": str(error), **self._steepest()}
             raise DivergedError(Outcome(Reason.STAGES_NOT_FOUND, t, self.equation.fastest_joint(y), facts)) from None
@@ -93,22 +93,22 @@ class Watch:
 
     def pace(self, t: float, y: Array, steps: int) -> None:
         """Raise DivergedError if the steps of an adaptive method are too short for the run to finish."""
-        since = steps - self.looked
+        since = steps - self.paced_steps
         if since < _PACED:
             return
-        made, self.paced, self.looked = t - self.paced, t, steps
-        ahead = (self.setup.duration_s - t) / max(made, 1e-300) * since
-        if ahead > _MOST_AHEAD:
+        advanced, self.paced_t, self.paced_steps = t - self.paced_t, t, steps
+        remaining = (self.setup.duration_s - t) / max(advanced, 1e-300) * since
+        if remaining > _MOST_AHEAD:
             implicit = "" if self.setup.method.name == "Rodas5P" else "Rodas5P, "
-            facts: dict[str, float | str] = {"steps": since, "advanced_s": made, "remaining": ahead}
+            facts: dict[str, float | str] = {"steps": since, "advanced_s": advanced, "remaining": remaining}
             facts["remedy"] = f"{implicit}softer effects or a larger tolerance"
-            motion = self._fastest(t, y, made / since)
+            motion = self._fastest(t, y, advanced / since)
             facts |= motion.facts if motion else {}
             joint = motion.joint if motion else ""
             raise DivergedError(Outcome(Reason.STALLED, t, joint, facts | self._steepest()))
 
     def _fastest(self, t: float, y: Array, h: float) -> Fastest | None:
-        """Return the fastest motion if it is found at this state and fast enough for stability to limit h."""
+        """Return the fastest motion at a state if stability limits h to it; None also if it cannot be computed."""
         held = np.zeros(self.equation.plant.dynamics.n) if self.equation.sampled else None
         try:
             motion = fastest(self.equation, t, y, held)

@@ -120,7 +120,7 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
 def _check_payloads(plant: Plant, method: Method) -> None:
     """Check that a method can continue after a payload has been picked up or dropped."""
     for is_unsuited, reason in (
-        (method.canonical, f"what is picked up or dropped changes momenta, which {method.name} integrates"),
+        (method.canonical, f"picking up or dropping a payload changes momenta, which {method.name} integrates"),
         (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
     ):
         if plant.equation_of_motion.payloads and is_unsuited:

@@ -28,8 +28,8 @@ def control_lines(controller: Controller, dynamics: Dynamics) -> Iterator[str]:
     yield f"control: {inside.name}, {pace(controller.period_s)}"
     yield from (f"  {text}" for text in as_they_act([inside], dynamics))
     if isinstance(controller, Loop):
-        for name in ("measurement_delay", "actuation_delay"):
-            yield f"  {name} = {getattr(controller, name):g} periods"
+        for name in ("measurement_delay_periods", "actuation_delay_periods"):
+            yield f"  {name} = {getattr(controller, name):g}"
     for path, _, part in controller.parts:
         if part is not inside:
             line = path.removeprefix("controller.").partition(".")[0]

@@ -95,7 +95,7 @@ class Setup(Value, Caching):
             float64; or "auto", which compiles if that saves time, and uses machine code that exists already.
         events: Events to locate. A step ends at each of them, and a terminal event ends the run.
         accuracy: Largest permitted error of q over joints and times: one number for rad and m, or a number for each
-            unit, for example {"rad": 1e-8, "m": 1e-6}, the smallest of which applies. Pilot runs choose method and
+            unit, for example {"rad": 1e-8, "m": 1e-6}; the smallest applies. Pilot runs choose method and
             tolerance; the error estimate checks the result.
     """
 
@@ -168,7 +168,7 @@ class Setup(Value, Caching):
     def _repr_html_(self) -> str:
         return explanation_of(self)._repr_html_()
 
-    def __getstate__(self) -> Any:
+    def __getstate__(self) -> tuple[dict[str, object], tuple[str, ...]]:
         state, frozen = super().__getstate__()
         return {field.name: state[field.name] for field in fields(self)}, frozen
 

@@ -38,7 +38,7 @@ def budget(
     limits: str | None = None,
     max_payload: str | None = None,
     fastest: bool = False,
-    share: float | None = None,
+    fraction: float | None = None,
     unit: str | None = None,
     period: float | None = None,
     time: str | None = None,
@@ -60,7 +60,7 @@ def budget(
             robot's file.
         max_payload (LINK@X,Y,Z): Find the largest payload there that still fits.
         fastest: Move along the same path as fast as the limits allow; -o and --csv then write this motion.
-        share: With --fastest: fraction of the peak torques that it may use, up to 1.
+        fraction: With --fastest: fraction of the peak torques that it may use, up to 1.
         unit: rad or deg, for angles in the plan without a unit in the heading.
         period (SECONDS): Time between rows of a plan without times.
         time (COLUMN): Heading of the times in the plan, unless it is t or time.
@@ -70,8 +70,8 @@ def budget(
     from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
     paths = results.files(MotorBudget, what, plan, limits)
-    if share is not None and not fastest:
-        raise QueryError("--share is for the fastest motion: add --fastest, or remove --share")
+    if fraction is not None and not fastest:
+        raise QueryError("--fraction is for the fastest motion: add --fastest, or remove --fraction")
     if time is not None and period is not None:
         raise QueryError("--time and --period both give the times: remove one of them")
     motors = None if limits is None else rd.tools.motors.read_motors(limits)
@@ -95,7 +95,7 @@ def budget(
         bodies = [arguments.payload(text) for text in payload or ()] or None
         with bar(what="computing the torque"):
             result = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
-    more = _more(result, max_payload, fastest, 1.0 if share is None else share)
+    more = _more(result, max_payload, fastest, 1.0 if fraction is None else fraction)
     budgets = [result, more["fastest"].budget] if fastest else [result]
     results.give(result, paths, budgets[-1], **more)
     if not all(x.fits for x in budgets):
@@ -111,7 +111,7 @@ def _run(path: str) -> Trajectory:
         return rd.simulate(setup, on_progress=advance)
 
 
-def _more(result: MotorBudget, max_payload: str | None, fastest: bool, share: float) -> dict[str, Any]:
+def _more(result: MotorBudget, max_payload: str | None, fastest: bool, fraction: float) -> dict[str, Any]:
     """Return further results of a budget, by key."""
     more: dict[str, Any] = {}
     if max_payload is not None:
@@ -121,5 +121,5 @@ def _more(result: MotorBudget, max_payload: str | None, fastest: bool, share: fl
             )
     if fastest:
         with bar(what="planning the fastest motion"):
-            more["fastest"] = rd.tools.motors.fastest(result, share)
+            more["fastest"] = rd.tools.motors.fastest(result, fraction)
     return more

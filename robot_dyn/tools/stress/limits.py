@@ -106,7 +106,7 @@ def payload_limit(robot: Robot, states: Batch, rng: np.random.Generator, gains: 
         by_torque, load = _load(Lagrangian(loaded).N(q), effort)
         if gains is None:
             return by_torque, load
-        plant, law = Plant(loaded, [EffortLimit(effort)]), PDGravity(loaded, hold(q), *gains)
+        plant, law = Plant(loaded, [EffortLimit(effort)]), PDGravity(loaded, hold(q), kp=gains[0], kd=gains[1])
         setup = Setup(plant, q, duration_s=_HOLD_S, controller=law, estimate_error=False, engine="interpreted")
         setups.append(setup)
         try:
@@ -160,10 +160,8 @@ def _tip(robot: Robot, states: Batch) -> str:
 def held(robot: Robot, q: np.ndarray, gains: Gains, rate: float) -> Setup:
     """Return a setup that holds the arm at rest at q, for 400 times 1/rate, with the rate of its fastest motion."""
     effects = [ViscousFriction(robot.damping)] if np.any(robot.damping) else []
-    return Setup(
-        Plant(robot, effects), q, duration_s=_TIMES / rate, controller=PDGravity(robot, hold(q), *gains),
-        engine="interpreted",
-    )  # fmt: skip
+    law = PDGravity(robot, hold(q), kp=gains[0], kd=gains[1])
+    return Setup(Plant(robot, effects), q, duration_s=_TIMES / rate, controller=law, engine="interpreted")
 
 
 def step_limits(setup: Setup, seed: int, work: Work) -> Iterator[Limit | None]:
@@ -258,7 +256,7 @@ def _sampled(setup: Setup, omega: float) -> Setup:
     """Return the setup under a sampled PD of another frequency."""
     law = _law(setup)
     inertia = law.kd**2 / (4 * law.kp)
-    sampled = PDGravity(law.model, law.reference, inertia * omega**2, 2 * inertia * omega, _PERIOD_S)
+    sampled = PDGravity(law.model, law.reference, kp=inertia * omega**2, kd=2 * inertia * omega, period_s=_PERIOD_S)
     return replace(setup, controller=sampled)
 
 

@@ -90,7 +90,8 @@ def _control(family: str, q: np.ndarray, scale: np.ndarray, duration: float, rng
         return None
     period = float(rng.choice([0.001, 0.002, 0.005])) if family == "sampled PD" else 0.0
     plan = quintic(q, q + rng.uniform(-0.3, 0.3, len(q)), duration)
-    return PD(plan, *gains_from(scale, float(rng.uniform(5, 30)), 0.7), period_s=period)
+    kp, kd = gains_from(scale, float(rng.uniform(5, 30)), 0.7)
+    return PD(plan, kp=kp, kd=kd, period_s=period)
 
 
 def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:

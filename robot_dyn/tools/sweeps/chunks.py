@@ -109,5 +109,7 @@ def share_of(text: Any) -> tuple[int, int]:
         return 1, 1
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text) if isinstance(text, str) else None
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise SweepError(f"share: give job and number of jobs, such as '3/16' for the third of 16, got {shown(text)}")
+        raise SweepError(
+            f"job: give its number and the number of jobs, such as '3/16' for the third of 16, got {shown(text)}"
+        )
     return int(match[1]), int(match[2])

@@ -32,7 +32,7 @@ def sweep(
     seed: int | None = None,
     threads: int | None = None,
     cluster: str | None = None,
-    share: str | None = None,
+    job: str | None = None,
     scene: str | None = None,
     chunk: int | None = None,
     probability: list[str] | None = None,
@@ -57,7 +57,7 @@ def sweep(
         seed: Seed of the design.
         threads: Threads of this process; by default one for each processor.
         cluster: Workers of Dask instead of threads: local:2, or tls://host:8786.
-        share (3/16): Part of one job of an array.
+        job (3/16): Number of this job of an array, and number of jobs.
         scene: For a folder: present path of its scene, or the function module:function that returns the setup.
         chunk: Runs in a file; by default about 2 s of work.
         probability (EVENT): Estimate the probability of an event such as 'failed | error > 0.1'; may be repeated.
@@ -66,7 +66,7 @@ def sweep(
 
     verified: list[str] = []
     figures = arguments.pairs("--figure", figure)
-    options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
+    options: dict[str, Any] = {"threads": threads, "cluster": cluster, "job": job}
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the folder to fill with -o FOLDER")
@@ -95,7 +95,7 @@ def sweep(
         say_json(result, probabilities=dict(zip(probability or (), answers, strict=False)))
     else:
         say(result, *verified, *answers)
-    if result.status["missing"] and what != "status" and share is None:
+    if result.status["missing"] and what != "status" and job is None:
         raise typer.Exit(130)
 
 

@@ -47,7 +47,7 @@ def run(
     *,
     threads: int | None = None,
     cluster: Any = None,
-    share: str | None = None,
+    job: str | None = None,
     chunk: int | None = None,
     on_progress: Progress | None = None,
 ) -> SweepResult:
@@ -61,7 +61,7 @@ def run(
         folder: A new folder, or the folder of the same sweep.
         threads: Number of threads of this process; None for one for each processor.
         cluster: Workers of Dask.distributed instead of threads: "local:2", the address of a scheduler, or a `Client`.
-        share: Part of the chunks, for example "3/16" in the third of 16 jobs.
+        job: Part of the chunks, for example "3/16" in the third of 16 jobs.
         chunk: Number of runs in a file; None for about 2 s of work, by a pilot of 64 runs. Constant for a folder.
         on_progress: Function of the number of finished runs, and of all runs.
 
@@ -70,10 +70,10 @@ def run(
     """
     instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read_sweep(folder).sweep", error=SweepError)
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
-    path, (job, jobs), work = file_path(folder, SweepError), share_of(share), Work(sweep)
+    path, (number, jobs), work = file_path(folder, SweepError), share_of(job), Work(sweep)
     count = thread_count(threads)
-    if cluster is not None and (share is not None or threads is not None):
-        raise SweepError("cluster: its scheduler distributes the chunks; remove share and threads")
+    if cluster is not None and (job is not None or threads is not None):
+        raise SweepError("cluster: its scheduler distributes the chunks; remove job and threads")
     check_places(path)
     check_folder(path, SweepError)
     _ = sweep.setup, work.record  # raises if a folder names functions that its reader has not named
@@ -89,7 +89,7 @@ def run(
 
     def missing() -> list[int]:
         chunks = store.missing()
-        return chunks[chunks % jobs == job - 1].tolist()
+        return chunks[chunks % jobs == number - 1].tolist()
 
     def make(number: int, look: Callable[[float], object]) -> None:
         if not store.file(number).exists():  # another driver was first

@@ -89,13 +89,13 @@ def _controller(
     plan = rd.control.quintic(q, q + rng.uniform(-1, 1, arm.n), duration * rng.uniform(0.4, 1.2))
     kp, kd = rd.control.gains_from(scale, rng.uniform(3, 12), 0.7)
     if family == "sampled":
-        law = rd.control.PD(plan, kp, kd, float(rng.choice([0.005, 0.01, 0.02])))
+        law = rd.control.PD(plan, kp=kp, kd=kd, period_s=float(rng.choice([0.005, 0.01, 0.02])))
         measured, acts = float(rng.choice([0.0, 0.4, 1.2])), float(rng.choice([0.0, 0.5, 1.0]))
         return rd.control.Loop(
-            law, position=rd.control.Noise(1e-4), velocity=rd.control.LowPass(30.0), measurement_delay=measured,
-            actuation_delay=acts,
-            seed=int(rng.integers(99)),
+            law, position=rd.control.Noise(1e-4), velocity=rd.control.LowPass(30.0), measurement_delay_periods=measured,
+            actuation_delay_periods=acts,
+            noise_seed=int(rng.integers(99)),
         )  # fmt: skip
     if family == "effort limit" and rng.random() < 0.5:
-        return rd.control.PID(plan, kp, 2 * kp, kd, effort_limit=scale * rng.uniform(2, 20, arm.n))
-    return rd.control.PD(plan, kp, kd) if family == "effort limit" or rng.random() < 0.5 else None
+        return rd.control.PID(plan, kp=kp, ki=2 * kp, kd=kd, effort_limit=scale * rng.uniform(2, 20, arm.n))
+    return rd.control.PD(plan, kp=kp, kd=kd) if family == "effort limit" or rng.random() < 0.5 else None

@@ -45,7 +45,10 @@ def limited(seed: int, index: int) -> Limited:
     if sampled or rng.random() < 0.5:
         gains = rd.control.gains_from(scale, fast * rng.uniform(0.1, 0.5), rng.uniform(0.7, 1.5))
         controller = rd.control.PD(
-            rd.control.hold(q + rng.uniform(-0.05, 0.05, n)), *gains, period_s=1e-4 if sampled else 0.0
+            rd.control.hold(q + rng.uniform(-0.05, 0.05, n)),
+            kp=gains[0],
+            kd=gains[1],
+            period_s=1e-4 if sampled else 0.0,
         )
     setup = rd.Setup(
         rd.Plant(arm, effects), q, np.zeros(n), 0.5, controller, method, 1e-4, estimate_error=False

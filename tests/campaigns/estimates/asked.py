@@ -88,9 +88,10 @@ def request(seed: int, index: int) -> tuple[Scene, float]:
         period = float(rng.choice([0.002, 0.005, 0.01])) if kind < 0.2 else 0.0
         if rng.random() < 0.4:
             gains = rd.control.gains_from(1.0, rng.uniform(3, 12))
-            law = rd.control.ComputedTorque(arm.with_(mass_scale=1.1), plan, *gains, period_s=period)
+            law = rd.control.ComputedTorque(arm.with_(mass_scale=1.1), plan, kp=gains[0], kd=gains[1], period_s=period)
         else:
-            law = rd.control.PD(plan, *rd.control.gains_from(scale, rng.uniform(3, 12), 0.7), period_s=period)
+            kp, kd = rd.control.gains_from(scale, rng.uniform(3, 12), 0.7)
+            law = rd.control.PD(plan, kp=kp, kd=kd, period_s=period)
     setup = rd.Setup(
         rd.Plant(arm, effects), q, v, duration, law, record_every_s=duration / 20, engine="interpreted"
     )  # fmt: skip

@@ -36,7 +36,7 @@ def held_scene(seed: int, index: int, of: str = "") -> tuple[Scene, float]:
     drive = None
     if rng.random() < 0.5:
         gains = scale * rng.uniform(5, 60, n), scale * rng.uniform(0.3, 3, n)
-        drive = rd.control.PD(rd.control.hold(q + rng.uniform(-0.5, 0.5, n)), *gains)
+        drive = rd.control.PD(rd.control.hold(q + rng.uniform(-0.5, 0.5, n)), kp=gains[0], kd=gains[1])
     setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, record_every_s=duration / 20)
     return Scene(family, setup, f"{seed}/{index} {family} {name} T={duration:g}"), float(10 ** rng.uniform(-10, -3))
 

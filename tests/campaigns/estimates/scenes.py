@@ -111,7 +111,6 @@ def _controller(rng: np.random.Generator, arm: rd.Robot, family: str, q, scale, 
     plan = rd.control.quintic(q, q + rng.uniform(-0.5, 0.5, arm.n), duration * rng.uniform(0.4, 1.2))
     omega = rng.uniform(3, 12)
     if rng.random() < 0.3:
-        return rd.control.ComputedTorque(
-            arm.with_(mass_scale=1.1), plan, *rd.control.gains_from(1.0, omega), period_s=period
-        )
-    return rd.control.PD(plan, *rd.control.gains_from(scale, omega, 0.7), period_s=period)
+        return rd.control.ComputedTorque(arm.with_(mass_scale=1.1), plan, bandwidth_rad_s=omega, period_s=period)
+    kp, kd = rd.control.gains_from(scale, omega, 0.7)
+    return rd.control.PD(plan, kp=kp, kd=kd, period_s=period)

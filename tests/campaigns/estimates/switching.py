@@ -40,7 +40,8 @@ def switching_scene(seed: int, index: int) -> Scene:
     drive = None
     if rng.random() < 0.4:
         plan = rd.control.quintic(q, q + rng.uniform(-0.5, 0.5, n), duration * rng.uniform(0.4, 1.2))
-        drive = rd.control.PD(plan, *rd.control.gains_from(scale, rng.uniform(3, 12), 0.7))
+        kp, kd = rd.control.gains_from(scale, rng.uniform(3, 12), 0.7)
+        drive = rd.control.PD(plan, kp=kp, kd=kd)
     text = str(rng.choice([*METHODS, "DP8", "DP8", "RK4", "GaussLegendre6"]))
     step = float(np.round(10 ** rng.uniform(-3.3, -2.1), 6))
     setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, text, step, engine="interpreted")

@@ -44,9 +44,15 @@ def at_rest(name: str, seed: int) -> tuple[rd.Robot, np.ndarray, tuple[np.ndarra
 def controller(arm: rd.Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], kind: str) -> rd.control.Controller:
     if kind == "PID in saturation":
         limit = 1.5 * np.abs(arm.N(q)) + 2e-3 * gains[0]  # [N m], of twice the deviation at the start
-        return rd.control.PID(rd.control.hold(q), gains[0], 3 * gains[0], gains[1], limit, period_s=1e-3)
-    law = rd.control.PD(rd.control.hold(q + arm.N(q) / gains[0]), *gains, 1e-3)
-    return rd.control.Loop(law, measurement_delay=LATE[kind][0], actuation_delay=LATE[kind][1]) if kind != "PD" else law
+        return rd.control.PID(
+            rd.control.hold(q), kp=gains[0], ki=3 * gains[0], kd=gains[1], effort_limit=limit, period_s=1e-3
+        )
+    law = rd.control.PD(rd.control.hold(q + arm.N(q) / gains[0]), kp=gains[0], kd=gains[1], period_s=1e-3)
+    return (
+        rd.control.Loop(law, measurement_delay_periods=LATE[kind][0], actuation_delay_periods=LATE[kind][1])
+        if kind != "PD"
+        else law
+    )
 
 
 def run_at(arm: rd.Robot, q: np.ndarray, law: rd.control.Controller, period: float) -> tuple[rd.Trajectory, float]:
@@ -88,7 +94,9 @@ def _wound_up(name: str, seed: int) -> Iterator[Row]:
     """A step of the reference by 1 rad, of which the effort limit leaves a tenth of the torque."""
     arm, q, gains = at_rest(name, seed)
     case, limit = f"{name}, a step in saturation", 1.5 * np.abs(arm.N(q)) + 0.1 * gains[0]
-    law = rd.control.PID(rd.control.hold(q + 1.0), gains[0], 2 * gains[0], gains[1], limit, period_s=1e-3)
+    law = rd.control.PID(
+        rd.control.hold(q + 1.0), kp=gains[0], ki=2 * gains[0], kd=gains[1], effort_limit=limit, period_s=1e-3
+    )
     run = rd.simulate(
         arm,
         q,

@@ -141,7 +141,16 @@ def control(
 ) -> rd.control.OperationalSpace:
     """A bandwidth of 10 rad/s, critically damped, and the posture of the start where the task leaves one free."""
     return rd.control.OperationalSpace(
-        robot, path.frame, target, 100.0, 20.0, posture, 25.0, 10.0, rows=path.rows, threshold=path.threshold
+        robot,
+        path.frame,
+        target,
+        kp=100.0,
+        kd=20.0,
+        posture=posture,
+        posture_kp=25.0,
+        posture_kd=10.0,
+        rows=path.rows,
+        threshold=path.threshold,
     )
 
 
@@ -175,7 +184,9 @@ def _half_turns(seed: int) -> Iterator[Row]:
 
         def torque(angle: float, q=q, a=a, g=g) -> float:
             R = rotation(a, angle) @ g[:3, :3]
-            law = rd.control.OperationalSpace(robot, frame, line(g[:3, 3], g[:3, 3], 1.0, rotation=R), 100.0, 20.0)
+            law = rd.control.OperationalSpace(
+                robot, frame, line(g[:3, 3], g[:3, 3], 1.0, rotation=R), kp=100.0, kd=20.0
+            )
             return float(np.abs(law.torque(0.0, q, 0 * q, np.zeros(0))).max())
 
         usual = max(torque(np.pi - 0.1), torque(-np.pi + 0.1))
@@ -190,7 +201,7 @@ def _half_turns(seed: int) -> Iterator[Row]:
     largest = []
     for angle in (np.pi - 0.1, np.pi):
         R = g[:3, :3] @ rotation(np.array([0.0, 0.0, 1.0]), angle)
-        law = rd.control.OperationalSpace(robot, frame, line(g[:3, 3], g[:3, 3], 1.0, rotation=R), 100.0, 20.0)
+        law = rd.control.OperationalSpace(robot, frame, line(g[:3, 3], g[:3, 3], 1.0, rotation=R), kp=100.0, kd=20.0)
         run = rd.simulate(robot, WRIST.start, duration_s=1.5, controller=law, estimate_error=False)
         largest.append(np.abs(run.extremes).max(axis=(1, 2)))
     yield Row(case, "|v| of a half turn in place, over that of π − 0.1", largest[1][1] / largest[0][1], MOST)

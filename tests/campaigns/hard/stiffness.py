@@ -95,7 +95,7 @@ def _explicit(case: str, motion: Motion, setup: rd.Setup) -> Iterator[Row]:
 
 def _driven(name: str, k: float) -> Motion:
     d = np.sqrt(k)
-    law = rd.control.PD(rd.control.hold(np.full(rd.load(name).n, 0.3)), k, d)
+    law = rd.control.PD(rd.control.hold(np.full(rd.load(name).n, 0.3)), kp=k, kd=d)
     return of_arm(name, [], lambda q, v: k * (0.3 - q) - d * v, law)
 
 

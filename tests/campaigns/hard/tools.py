@@ -131,7 +131,7 @@ def engines(name: str, seed: int) -> Iterator[Row]:
     inertia = np.diag(robot.M(q[0]))  # gains in its units are as slow on every arm
     setup = rd.Setup(
         rd.Plant(robot, [rd.effects.ViscousFriction(inertia)]), q[0], v[0], duration_s=STEPS * 1e-3, method="RK4",
-        controller=rd.control.PD(rd.control.hold(q[0]), 25 * inertia, 2 * inertia, period_s=5e-3), step_s=1e-3,
+        controller=rd.control.PD(rd.control.hold(q[0]), kp=25 * inertia, kd=2 * inertia, period_s=5e-3), step_s=1e-3,
         estimate_error=False,
     )  # fmt: skip
     case = f"{name}: a run of {STEPS} steps"

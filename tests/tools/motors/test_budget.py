@@ -243,7 +243,7 @@ def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so
 
 
 def followed(plant: rd.Plant, **options: Any) -> rd.Trajectory:
-    law = rd.control.ComputedTorque(plant.dynamics, PLAN.reference, 400.0, 40.0)  # pyright: ignore
+    law = rd.control.ComputedTorque(plant.dynamics, PLAN.reference, kp=400.0, kd=40.0)  # pyright: ignore
     return rd.simulate(
         plant, POINTS[0], **{"duration_s": TIMES[-1], "controller": law, "estimate_error": False} | options
     )
@@ -412,7 +412,7 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
         and fast.plan.reference is PLAN.reference
     )
     assert "the original motion, which fits" in repr(fast)
-    half = fastest(given, share=0.4)
+    half = fastest(given, fraction=0.4)
     assert not half.given and "at 40 % of the peak torques" in repr(half)
 
 
@@ -444,7 +444,9 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
     assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
     assert refusal(["budget", "ur5"]).startswith("ur5: give a motion as well")
     assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
-    assert "--share is for the fastest motion: add --fastest" in refusal(["budget", "ur5", plan, "--share", "0.9"])
+    assert "--fraction is for the fastest motion: add --fastest" in refusal(
+        ["budget", "ur5", plan, "--fraction", "0.9"]
+    )
     assert "--joint must be JOINT=COLUMN" in refusal(["budget", "ur5", plan, "--joint", "J1"])
     assert "--max-payload must be LINK@X,Y,Z" in refusal(["budget", "ur5", plan, "--max-payload", "tool0@1"])
 
@@ -475,7 +477,7 @@ def test_the_command_ends_with_1_if_the_fastest_motion_or_the_given_one_is_too_s
     assert answer["fastest"].keys() == names(promised_keys()["fastest"].partition(": ")[2])
     assert answer["fastest"]["budget"]["fits"] and answer["fastest"]["duration_s"] < answer["duration_s"]
     plan, motors = files / "plan.csv", files / "motors.csv"
-    done = ran("budget", "ur5", plan, "--fastest", "--share", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
+    done = ran("budget", "ur5", plan, "--fastest", "--fraction", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
     assert done.returncode == 0 and "at 90 % of the peak torques" in done.stdout
     assert "the same path at its limits" in (files / "b.svg").read_text(encoding="utf-8")
     heavy = ran("budget", "ur5", plan, "--limits", motors, "--fastest", "--payload", "wrist_3_link=5kg@0.12,0.03,0.05")
@@ -518,7 +520,7 @@ def test_a_run_that_simulates_its_gears_has_its_own_rotors(tmp_path: Path) -> No
 
     arm = rd.load("planar_2r")
     gears = rd.effects.SeriesElastic([2000.0, 500.0], [1e-4, 5e-5], 100.0, damping=2.0)
-    options = {"duration_s": 0.2, "controller": rd.control.PD(rd.control.hold([0.5, -0.3]), 200.0, 20.0)}
+    options = {"duration_s": 0.2, "controller": rd.control.PD(rd.control.hold([0.5, -0.3]), kp=200.0, kd=20.0)}
     run = rd.simulate(rd.Plant(arm, [gears]), [0.3, -0.5], **options)
     found, bare = rd.tools.motors.budget(run, motors=motors(1e-4)), rd.tools.motors.budget(run, effort=[200.0, 60.0])
     assert [x.peak for x in found.joints] == [x.peak for x in bare.joints]

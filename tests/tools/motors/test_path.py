@@ -151,9 +151,9 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
     """
     arm = rd.load("ur5").with_(payload=rd.Payload("tool0", 2.0))
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.2 * arm.effort_limit / arm.velocity_limit)])
-    found = rd.tools.motors.path(plant, WAY, share=0.95, velocity=0.98 * arm.velocity_limit)
+    found = rd.tools.motors.path(plant, WAY, fraction=0.95, velocity=0.98 * arm.velocity_limit)
     gains = [4000.0] * 3 + [800.0] * 3, [160.0] * 3 + [16.0] * 3
-    controller = rd.control.FeedForward(arm, found.reference, *gains)
+    controller = rd.control.FeedForward(arm, found.reference, kp=gains[0], kd=gains[1])
     run = rd.simulate(
         plant,
         WAY[0],
@@ -175,7 +175,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
 def test_more_torque_is_faster_and_the_path_is_the_same() -> None:
     robot = rd.load("ur5")
     points = _way_points(robot, seed=8)
-    slow, fast = (rd.tools.motors.path(robot, points, share=share) for share in (0.6, 1.0))
+    slow, fast = (rd.tools.motors.path(robot, points, fraction=share) for share in (0.6, 1.0))
     assert fast.duration_s < slow.duration_s
     passed = fast.reference.at(np.linspace(0, fast.duration_s, 20_000))[0]
     for point in points:
@@ -214,7 +214,7 @@ def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effect
         ("ur5", [[0.1] * 6, [0.1] * 6, [0.3] * 6], {}, "equal"),
         ("planar_2r", [[0.3, -0.4], [0.7, 1e308]], {}, r"points must be within 1e\+100 rad or m, got 1e\+308"),
         ("ur5", [[0.1] * 6, [9.0] * 6], {}, "outside its limits"),
-        ("ur5", [[0.1] * 6, [0.5] * 6], {"share": 1.2}, "at most 1"),
+        ("ur5", [[0.1] * 6, [0.5] * 6], {"fraction": 1.2}, "at most 1"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": {"elbow": 3.0}}, "elbow"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": 3.0}, "'shoulder_lift_joint' needs"),
         ("planar_2r", [[0.1] * 2, [0.5] * 2], {}, "nothing limits"),
@@ -247,8 +247,9 @@ def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
     text = repr(found)
     assert f"{found.duration_s:.6g} s" in text
     assert "shoulder_pan_joint" in text
-    assert found.phases[0].start == pytest.approx(0.0, abs=0.01 * found.duration_s)
-    assert all(first.end <= second.start + 1e-12 for first, second in zip(found.phases, found.phases[1:], strict=False))
+    assert found.phases[0].start_s == pytest.approx(0.0, abs=0.01 * found.duration_s)
+    pairs = zip(found.phases, found.phases[1:], strict=False)
+    assert all(first.end_s <= second.start_s + 1e-12 for first, second in pairs)
     assert "<svg" in found.drawing
     assert '"at_limits"' in found.to_json()
 

@@ -393,7 +393,7 @@ class Own(rd.effects.Dissipative):
 
 def refused() -> list[tuple[str, dict[str, Any]]]:
     n, plan = 2, rd.control.hold([0.1, 0.2])
-    pd, robot = rd.control.PD(plan, 9.0, 1.0, 0.01), rd.load("planar_2r")
+    pd, robot = rd.control.PD(plan, kp=9.0, kd=1.0, period_s=0.01), rd.load("planar_2r")
     payload = rd.effects.CarriedPayload(rd.Payload("tip", 1.0), 0.01, 0.02)
     return [
         ("dry_friction", {"effects": [rd.effects.DryFriction([1.0] * n)]}),
@@ -406,11 +406,14 @@ def refused() -> list[tuple[str, dict[str, Any]]]:
         ("carried_payload", {"effects": [payload]}),
         ("PD is sampled", {"controller": pd}),
         ("Loop", {"controller": rd.control.Loop(pd)}),
-        ("PID", {"controller": rd.control.PID(plan, 9.0, 1.0, 1.0, 5.0)}),
+        ("PID", {"controller": rd.control.PID(plan, kp=9.0, ki=1.0, kd=1.0, effort_limit=5.0)}),
         ("torque", {"controller": lambda t, q, v: -q}),
         (
             "Samples",
-            {"controller": rd.control.PD(rd.control.Samples([0.0, 1.0], np.ones((2, 2))), 9.0, 1.0), "robot": robot},
+            {
+                "controller": rd.control.PD(rd.control.Samples([0.0, 1.0], np.ones((2, 2))), kp=9.0, kd=1.0),
+                "robot": robot,
+            },
         ),
     ]
 
@@ -451,10 +454,10 @@ ACTING: dict[str, Any] = {
     "viscous": ("planar_2r", [rd.effects.ViscousFriction([0.5, 0.3])], None),
     "spring": ("planar_2r", [rd.effects.Spring([10.0, 3.0], 0.2)], None),
     "tanh": ("planar_2r", [rd.effects.RegularisedCoulombFriction([1.0, 0.5], 0.5)], None),
-    "PD": ("planar_2r", (), lambda model: rd.control.PD(PLAN, 100.0, [10.0, 4.0])),
-    "PDGravity": ("planar_2r", (), lambda model: rd.control.PDGravity(model, PLAN, 100.0, [10.0, 4.0])),
-    "FeedForward": ("planar_2r", (), lambda model: rd.control.FeedForward(model, PLAN, 100.0, [10.0, 4.0])),
-    "ComputedTorque": ("planar_2r", (), lambda model: rd.control.ComputedTorque(model, PLAN, 100.0, 20.0)),
+    "PD": ("planar_2r", (), lambda model: rd.control.PD(PLAN, kp=100.0, kd=[10.0, 4.0])),
+    "PDGravity": ("planar_2r", (), lambda model: rd.control.PDGravity(model, PLAN, kp=100.0, kd=[10.0, 4.0])),
+    "FeedForward": ("planar_2r", (), lambda model: rd.control.FeedForward(model, PLAN, kp=100.0, kd=[10.0, 4.0])),
+    "ComputedTorque": ("planar_2r", (), lambda model: rd.control.ComputedTorque(model, PLAN, kp=100.0, kd=20.0)),
     "prismatic": ("cart_pole", (), None),
     "mimic": ("mimic_chain", (), None),
 }
@@ -487,7 +490,7 @@ def test_a_reference_may_pass_from_one_polynomial_to_another() -> None:
     """Steps end at its breaks, and behind the last one it rests."""
     plan = rd.control.quintic([0.31, -0.42], [0.5, -0.5], 0.05, start_s=0.01)
     robot = arm("planar_2r")
-    setup = rd.Setup(rd.Plant(robot), [0.31, -0.42], duration_s=0.08, controller=rd.control.PD(plan, 100.0, 10.0))
+    setup = rd.Setup(rd.Plant(robot), [0.31, -0.42], duration_s=0.08, controller=rd.control.PD(plan, kp=100.0, kd=10.0))
     made, run = (
         rd.tools.proof.prove(setup),
         rd.simulate(replace(setup, method=rd.integrate.Adaptive("DOP853", 1e-13, 1e-14))),

@@ -165,7 +165,7 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
         elif each.what == FASTEST:  # the advisor's, to two digits, where gravity is balanced
             gains = (0.0, 0.0) if each.note != BY_PD else pd_of(result)
             effects = () if each.note == BY_PD else "urdf"
-            held = rd.control.PDGravity(robot, rd.control.hold(state["q"]), *gains)
+            held = rd.control.PDGravity(robot, rd.control.hold(state["q"]), kp=gains[0], kd=gains[1])
             setup = rd.Setup(rd.Plant(robot, effects), state["q"], controller=held, duration_s=1e-4)
             assert abs(rd.advise(setup).fastest.eigenvalue) == pytest.approx(each.minimal, rel=0.06)
         elif each.note.startswith("Pinocchio"):
@@ -323,7 +323,7 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
 def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     """Steps beyond their limit: the run leaves the equilibrium, and admits that."""
     robot = rd.load("pendulum")
-    law = rd.control.PDGravity(robot, rd.control.hold([0.4]), 133.0, 13.3)
+    law = rd.control.PDGravity(robot, rd.control.hold([0.4]), kp=133.0, kd=13.3)
     setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, method="Midpoint", step_s=0.11)
     pushed = limits.run_from_near(setup, np.array([0.4]), Budget(), True)
     assert pushed.growth > 30 and not pushed.misleads  # it says so

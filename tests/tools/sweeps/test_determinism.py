@@ -79,7 +79,7 @@ def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
     setup = sweep.setup
     for i in (0, 17):
         controller = setup.controller
-        gains = rd.control.PD(controller.desired, rows["kp"][i], controller.kd)
+        gains = rd.control.PD(controller.desired, kp=rows["kp"][i], kd=controller.kd)
         q0 = [rows["q0[0]"][i], rows["q0[1]"][i]]
         run = rd.simulate(
             setup.plant, q0, controller=gains, duration_s=setup.duration_s, method="RK4", step_s=0.001,
@@ -92,9 +92,9 @@ def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
 
 def test_jobs_of_an_array_make_each_chunk_once(tmp_path: Path) -> None:
     sweep = swept(tmp_path, 150)
-    left = [len(sw.run(sweep, tmp_path / "out", chunk=10, share=f"{job}/4").missing) for job in (3, 1, 4)]
+    left = [len(sw.run(sweep, tmp_path / "out", chunk=10, job=f"{job}/4").missing) for job in (3, 1, 4)]
     assert left == [11, 7, 4]  # of 15 chunks these jobs make 4, 4 and 3, and the second makes 4
-    done = sw.run(sweep, tmp_path / "out", share="2/4")
+    done = sw.run(sweep, tmp_path / "out", job="2/4")
     assert done.status["missing"] == 0
     assert done.verify() == digest(sweep)
 
@@ -103,7 +103,9 @@ def test_rollouts_numbered_otherwise_are_those_runs() -> None:
     """`numbers` of rd.rollouts: the noise of run 5 wherever it stands."""
     arm = rd.load("planar_2r")
     hold = rd.control.quintic([0.1, 0.2], [0.3, 0.1], 0.05)
-    loop = rd.control.Loop(rd.control.PD(hold, 40.0, 4.0, period_s=0.005), position=rd.control.Noise(0.01), seed=1)
+    loop = rd.control.Loop(
+        rd.control.PD(hold, kp=40.0, kd=4.0, period_s=0.005), position=rd.control.Noise(0.01), noise_seed=1
+    )
     setup = rd.Setup(rd.Plant(arm), [0.1, 0.2], duration_s=0.05, controller=loop, method="RK4")
     whole = rd.rollouts(setup, np.tile([0.1, 0.2], (8, 1)))
     part = rd.rollouts(setup, np.tile([0.1, 0.2], (2, 1)), numbers=[5, 2])

@@ -183,8 +183,8 @@ def test_addresses_of_this_machine_and_encrypted_ones_are_allowed() -> None:
 
 @pytest.mark.parametrize("given", ["0/4", "5/4", "1/0", "1", "a/b", "1/4/2", 3, "-1/4"])
 def test_shares_that_cannot_be_are_refused(tmp_path: Path, given: Any) -> None:
-    with pytest.raises(SweepError, match="share: give job and number of jobs"):
-        sw.run(swept(tmp_path), tmp_path / "out", share=given)
+    with pytest.raises(SweepError, match="job: give its number and the number of jobs"):
+        sw.run(swept(tmp_path), tmp_path / "out", job=given)
 
 
 # --- threads

@@ -190,7 +190,7 @@ def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Pa
 
     def pilot_of_the_second(sweep: sw.Sweep, chunk: int | None) -> int:
         monkeypatch.setattr(run_sweep, "pilot", pilot)
-        sw.run(first, out, chunk=20, share="1/3")
+        sw.run(first, out, chunk=20, job="1/3")
         return pilot(sweep, chunk)
 
     monkeypatch.setattr(run_sweep, "pilot", pilot_of_the_second)

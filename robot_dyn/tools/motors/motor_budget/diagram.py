@@ -1,4 +1,4 @@
-"""A budget drawn: what is used of each limit, the rms torque by cause, and the torque of each joint over time."""
+"""Diagram of a motor budget: used fraction of each limit, rms torque by cause, torque of each joint over time."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDE, _ROW, _CELL, _AROUND = 13.0, 0.42, 2.3, 1.9  # [inch]
-_ACROSS, _MOST = 3, 64  # joints beside each other; that one figure shows
-_LETTERS = 24  # of the name of a joint beside bars
+_ACROSS, _MOST = 3, 64  # joints in a row; joints of a figure
+_LETTERS = 24  # in the name of a joint next to its bars
 _BAR = 0.27
 _SHADES = {"peak": 1.0, "continuous": 0.72, "speed": 0.46}  # of ink, of bars: colours are those of causes
 
@@ -46,7 +46,7 @@ def draw(result: MotorBudget, theme: str = "light") -> Figure:
 
 
 def _names(result: MotorBudget) -> list[str]:
-    return [drawable(shortened(each.joint, _LETTERS)) for each in result.joints]
+    return [drawable(shortened(joint.joint, _LETTERS)) for joint in result.joints]
 
 
 def _used(axes: Any, result: MotorBudget, colours: Colours) -> None:
@@ -110,7 +110,7 @@ def _over_time(axes: Any, result: MotorBudget, i: int, joint: JointBudget, colou
 
 
 def _colour(colours: Colours, k: int) -> str:
-    """Of a cause: those of the theme that are not of the total."""
+    """Return the colour of cause k, from the colours of the theme without the colour of the total."""
     hues = [colours["lines"][j] for j in (1, 2, 3, 5, 6)]
     return hues[k % len(hues)]
 

@@ -45,7 +45,7 @@ class FastestMotion(Answer):
         slowed: Factor λ on the duration that satisfies continuous torques; 1 if it is not needed, or no λ suffices.
         no_pace: The joint that exceeds its continuous torque at every pace, in words; empty if a pace fits.
         given: True if the original motion fits, and no faster one that fits was found.
-        share: Fraction of the peak torques that it may use.
+        fraction: Fraction of the peak torques that it may use.
         budget: Motor budget of the motion.
         plan: The motion.
     """
@@ -56,7 +56,7 @@ class FastestMotion(Answer):
     slowed: float
     no_pace: str
     given: bool
-    share: float
+    fraction: float
     budget: MotorBudget
     plan: Plan = field(metadata=UNREPORTED)
 
@@ -67,13 +67,13 @@ class FastestMotion(Answer):
 
     def blocks(self) -> Iterator[Block]:
         _, *rest = self.plan.blocks()
-        share = "" if self.share == 1 else f" at {100 * self.share:.6g} % of the peak torques"
+        limit = "" if self.fraction == 1 else f" at {100 * self.fraction:.6g} % of the peak torques"
         if self.given:
-            yield f"found no faster motion along the path that fits{share}; the original motion, which fits:"
+            yield f"found no faster motion along the path that fits{limit}; the original motion, which fits:"
         else:
             stops = "without a stop" if self.strokes == 1 else f"in {self.strokes} strokes, with the same pauses"
             times = f"{self.duration_s:.4g} s instead of {self.before_s:.4g} s"
-            yield f"the same path in {times}{share}, {stops}, within {self.distance:.1g} rad or m of it:"
+            yield f"the same path in {times}{limit}, {stops}, within {self.distance:.1g} rad or m of it:"
         yield from rest
         if self.slowed > 1:
             yield f"slowed down by {self.slowed:.4g} to satisfy continuous torques"
@@ -82,7 +82,7 @@ class FastestMotion(Answer):
         yield self.budget.verdict
 
 
-def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
+def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
     """Plan the path of a motion as fast as the limits of its budget allow, from stop to stop; pauses keep their length.
 
     The path is kept, but not the timing: with a uniform factor, the slowest place would limit the whole motion. If the
@@ -91,7 +91,7 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
 
     Args:
         motor_budget: The budget of a plan.
-        share: Fraction of the peak torques that the motion may use, up to 1.
+        fraction: Fraction of the peak torques that the motion may use, up to 1.
 
     Raises:
         QueryError: If the budget is of a run.
@@ -99,15 +99,15 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
         MissingExtraError: If toppra is not installed.
     """
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
-    plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, share)
+    plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, fraction)
     bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": limits.continuous}
     before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, limits.continuous)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
     new_budget = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
-    result = {"before_s": before, "strokes": strokes, "share": share}
-    if _fits(motor_budget, share) and (not new_budget.fits or plan.duration_s >= before):
+    result = {"before_s": before, "strokes": strokes, "fraction": fraction}
+    if _fits(motor_budget, fraction) and (not new_budget.fits or plan.duration_s >= before):
         plan = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
         return FastestMotion(**result, distance=0.0, slowed=1.0, no_pace="", given=True, budget=motor_budget, plan=plan)
     slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, new_budget))
@@ -116,9 +116,9 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
     )
 
 
-def _fits(motor_budget: MotorBudget, share: float) -> bool:
-    """Return True if a motion is within all limits, and within a share of the peak torques."""
-    return motor_budget.fits and all(x.shares["peak"] <= share * (1 + TOLERANCE) for x in motor_budget.joints)
+def _fits(motor_budget: MotorBudget, fraction: float) -> bool:
+    """Return True if a motion is within all limits, and within a fraction of the peak torques."""
+    return motor_budget.fits and all(x.shares["peak"] <= fraction * (1 + TOLERANCE) for x in motor_budget.joints)
 
 
 def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
@@ -131,7 +131,7 @@ def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
     )
 
 
-def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: float) -> tuple[Plan, int, float]:
+def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, fraction: float) -> tuple[Plan, int, float]:
     """Return the plan, its number of strokes, and its largest distance from the path."""
     strokes = _strokes(motion)
     if not strokes:
@@ -145,13 +145,13 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: f
         still = np.ptp(places, axis=0) <= _STILL
         points[:, still] = q[still]
         points[0] = q  # end of the previous stroke
-        stroke = path(plant, points, share=share, **bounds)
+        stroke = path(plant, points, fraction=fraction, **bounds)
         parts += [_pause(q, start - since), stroke.reference]
         off, since, q = max(off, _distance(points, way, places)), end, points[-1]
         findings |= dict.fromkeys(stroke.findings)
     parts.append(_pause(q, motion.end_s - since))
     robot: Any = plant.dynamics
-    by_kind = {"velocity": limits.velocity, "torque": limits.effort * share}
+    by_kind = {"velocity": limits.velocity, "torque": limits.effort * fraction}
     kinds, how = (robot.name, robot.joint_names, robot.joint_types), "the same path at its limits"
     return Plan(*kinds, _joined(parts), how, by_kind, tuple(findings)), len(strokes), off
 

@@ -43,7 +43,7 @@ def path(
     plant: Any,
     points: Any,
     *,
-    share: float = 1.0,
+    fraction: float = 1.0,
     effort: Any = None,
     velocity: Any = None,
     acceleration: Any = None,
@@ -51,17 +51,17 @@ def path(
 ) -> PathPlan:
     """Plan the fastest motion along a path, from rest to rest, within limits of torque, velocity and acceleration.
 
-        minimise T over s(t):  |τ(q, q̇, q̈)| ≤ share · τ_max,  |q̇| ≤ v_max,  |q̈| ≤ a_max  on q = q(s(t))
+        minimise T over s(t):  |τ(q, q̇, q̈)| ≤ fraction · τ_max,  |q̇| ≤ v_max,  |q̈| ≤ a_max  on q = q(s(t))
 
     τ is the plant's inverse dynamics, with all effects. The motion is a polynomial in each of a few hundred pieces, in
     which s̈ is constant: acceleration and torque jump between pieces, as in all time-optimal motions. The limits are
-    checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass share=0.95.
+    checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass fraction=0.95.
 
     Args:
         plant: A plant or an arm.
         points: Way points, (m, n), in [rad] or [m], joined by a natural cubic spline; or a
             `rd.control.PiecewisePolynomial`, whose timing is ignored.
-        share: Fraction of the effort limits that the motion may use, up to 1.
+        fraction: Fraction of the effort limits that the motion may use, up to 1.
         effort: Effort limits, one number, by joint name or (n,), in [N m] or [N]; by default the limits of the motors
             or, without motors, of the robot's file.
         velocity: Velocity limits, one number, by joint name or (n,), in [rad/s] or [m/s]; same default.
@@ -77,11 +77,11 @@ def path(
     Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis, 2018.
     """
     plant = plant if isinstance(plant, Plant) else Plant(plant)
-    share = number("share", share, error=PlanError, above=0.0)
-    if share > 1:
-        raise PlanError(f"share must be at most 1, got {share:g}")
+    fraction = number("fraction", fraction, error=PlanError, above=0.0)
+    if fraction > 1:
+        raise PlanError(f"fraction must be at most 1, got {fraction:g}")
     check_motors(motors)
-    limits = limits_of(plant, motors, effort, velocity, acceleration).times(share)
+    limits = limits_of(plant, motors, effort, velocity, acceleration).times(fraction)
     geometry = geometric_path(points, plant.dynamics.joint_names)
     check_effects(plant)
     check_positions(plant, geometry)
@@ -97,10 +97,10 @@ def path(
     robot: Any = plant.dynamics
     kinds = getattr(robot, "joint_types", ("revolute",) * robot.n)
     by_kind = {"velocity": limits.velocity, "acceleration": limits.acceleration, "torque": limits.effort}
-    method = "path at its limits" + ("" if share == 1 else f", with torques up to {share:.4g} of theirs")
+    method = "path at its limits" + ("" if fraction == 1 else f", with torques up to {fraction:.4g} of theirs")
     return PathPlan(
         Plan(getattr(robot, "name", "arm"), names, kinds, motion, method, by_kind, tuple(findings)),
-        share,
+        fraction,
         largest,
         at_limits,
         elsewhere(judgement, motion.breaks),

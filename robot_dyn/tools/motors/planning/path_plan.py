@@ -25,8 +25,8 @@ KINDS = "torque", "velocity", "acceleration"
 class Phase:
     """An interval of time, in [s], in which the limit of one kind and joint binds; both are "" if none does."""
 
-    start: float
-    end: float
+    start_s: float
+    end_s: float
     joint: str
     kind: str
 
@@ -49,9 +49,9 @@ class PathPlan(Answer, Value):
     """The fastest motion along a path; pass `reference` to a controller.
 
     Attributes:
-        plan: The motion, from rest to rest, with limits (torques times `share`) and findings.
-        share: Fraction of the effort limits that it may use.
-        largest: Largest torque, velocity or acceleration as a share of its limit; for torques, of `share` times it.
+        plan: The motion, from rest to rest, with limits (torques times `fraction`) and findings.
+        fraction: Fraction of the effort limits that it may use.
+        largest: Largest torque, velocity or acceleration as a share of its limit; for torques, of `fraction` times it.
         at_limits: Share of the time in which at least one limit is reached to 1 %.
         elsewhere: Reasons for no binding limit in the rest of the time, with the share of each reason.
         bindings: Use of each finite limit.
@@ -60,7 +60,7 @@ class PathPlan(Answer, Value):
     """
 
     plan: Plan
-    share: float
+    fraction: float
     largest: float
     at_limits: float
     elsewhere: dict[str, float]
