@@ -47,12 +47,14 @@ def program() -> Any:
     for entry in entry_points(group="robot_dyn.commands"):  # of tools
         entry.load()
     order = {group: k for k, group in enumerate(GROUPS)}
-    app.registered_commands.sort(key=lambda each: order.get(str(each.rich_help_panel), len(order)))
+    app.registered_commands.sort(key=lambda subcommand: order.get(str(subcommand.rich_help_panel), len(order)))
     whole = get_command(app)
     context = whole.context_class(whole, **whole.context_settings)
     options = [*whole.get_params(context)]
-    for each in whole.commands.values():  # pyright: ignore[reportAttributeAccessIssue]
-        options += each.get_params(each.context_class(each, parent=context, **each.context_settings))
+    for subcommand in whole.commands.values():  # pyright: ignore[reportAttributeAccessIssue]
+        options += subcommand.get_params(
+            subcommand.context_class(subcommand, parent=context, **subcommand.context_settings)
+        )
     for option in options:
         if getattr(option, "is_flag", False):  # takes no value: --help has no type for it
             option.metavar = ""  # pyright: ignore[reportAttributeAccessIssue]
@@ -89,12 +91,12 @@ def progress(items: Iterable[str], description: str) -> Iterator[str]:
 def bar(total: float | None = None, what: str = "simulating", at_the_end: str = "") -> Iterator[Callable[..., object]]:
     """A progress bar with the time left on stderr if it is a terminal; nothing elsewhere.
 
-    It gives a function of the part of the total that is done, and of the name of what is being done.
+    It yields a function that takes the finished part of the total and the name of the current work.
 
     Args:
         total: All that is to be done; None if that is not known: the bar then has the time spent.
-        what: What is being done, unless that function is told.
-        at_the_end: What is still being done once the total is reached.
+        what: Name of the work, unless that function receives another.
+        at_the_end: Name of the work that remains once the total is reached.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn

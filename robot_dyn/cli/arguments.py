@@ -48,7 +48,7 @@ def assignments(option: str, texts: list[str], what: str = "joint") -> dict[str,
 
 
 def pairs(option: str, texts: list[str] | None, form: str = "NAME=VALUE") -> dict[str, str]:
-    """What stands before and after the first = of each text."""
+    """Return the texts after the first =, by the text before it."""
     parts = {text: text.partition("=") for text in texts or ()}
     for text, (name, equals, _) in parts.items():
         if not (equals and name.strip()):
@@ -64,7 +64,7 @@ def payload(text: str) -> Payload:
     mass, place = _placed(body)
     if not (equals and link.strip()) or place is None:
         raise QueryError(f"--payload must be LINK=MASS@X,Y,Z in kg and m, as tool0=5kg@0,0,0.1; got {text!r}")
-    com = tuple(number("--payload, place in m", each) for each in place)
+    com = tuple(number("--payload, place in m", entry) for entry in place)
     return Payload(link.strip(), number("--payload, mass in kg", mass.strip().removesuffix("kg")), com)  # pyright: ignore[reportArgumentType]
 
 
@@ -73,11 +73,11 @@ def link_and_place(option: str, text: str) -> tuple[str, tuple[float, ...]]:
     link, place = _placed(text)
     if not link.strip() or place is None:
         raise QueryError(f"{option} must be LINK@X,Y,Z in m, as tool0@0,0,0.1; got {text!r}")
-    return link.strip(), tuple(number(f"{option}, place in m", each) for each in place)
+    return link.strip(), tuple(number(f"{option}, place in m", entry) for entry in place)
 
 
 def _placed(text: str) -> tuple[str, list[str] | None]:
-    """What stands before @X,Y,Z, and the three numbers, 0 without; None if they are not three."""
+    """Return the text before @X,Y,Z, and the three numbers, 0 without @; None if there are not three."""
     what, at, place = text.partition("@")
     numbers = place.removesuffix("m").split(",") if at else ["0"] * 3
     return what, numbers if len(numbers) == 3 else None

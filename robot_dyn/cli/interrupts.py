@@ -11,7 +11,7 @@ _AGAIN_S = 0.02
 
 def guard() -> None:
     """From now on Ctrl-C raises KeyboardInterrupt, after any import in progress; unless it is ignored."""
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as a shell asks of what it runs in the background
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell ignores it in background processes
         signal.signal(signal.SIGINT, _interrupt)
 
 

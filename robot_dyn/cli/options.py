@@ -56,7 +56,7 @@ Payloads = Annotated[
 
 @dataclass(frozen=True)
 class FileOptions:
-    """How a URDF or MJCF file is read, each None unless given.
+    """Options for reading a URDF or MJCF file; None where absent.
 
     With a mass, a total mass or a density, links without inertia get that of their shape.
 
@@ -99,11 +99,11 @@ class FileOptions:
 @final
 @dataclass(frozen=True)
 class RobotOptions(FileOptions):
-    """How the robot of a command is read, each None unless given.
+    """Options for reading the robot of a command; None where absent.
 
     Options:
         lock (JOINT=VALUE): Lock a joint at a value in rad or m; may be repeated.
-        without (WHAT,…): What is left out of MJCF: tendon, equality, free, ball.
+        without (WHAT,…): Parts left out of MJCF: tendon, equality, free, ball.
     """
 
     lock: Annotated[list[str] | None, typer.Option(autocompletion=completion.locks)] = None
@@ -126,7 +126,7 @@ class RobotOptions(FileOptions):
 @final
 @dataclass(frozen=True)
 class Results:
-    """What becomes of the result of a command: a figure, a table, text or JSON.
+    """Options for the result of a command: a figure, a table, text or JSON.
 
     Options:
         output (PLOT.png): Draw it, as a .png, .svg or .pdf.

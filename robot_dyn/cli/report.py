@@ -25,12 +25,12 @@ Document = dict[str, Any]
 
 
 def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Document:
-    """Comparisons by name, and what was refused."""
+    """Return the comparisons by name, and the refused robots."""
     return {"ok": all(result.ok for _, result in results), "robots": dict(results), "refused": refused}
 
 
 def run(trajectory: Trajectory) -> Document:
-    """How a run ended, what it took and how far to trust it; samples are in its run file."""
+    """Return the outcome, the cost and the accuracy of a run; samples are in its run file."""
     error, outcome = trajectory.error, trajectory.outcome
     return {
         "ending": outcome.ending,

@@ -32,7 +32,7 @@ def open_streams() -> None:
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:  # else a file opened later would take the place of one
         pass
     os.close(handle)
-    if sys.stdout is None:  # closed: what is written to it fails, as it does on /dev/full
+    if sys.stdout is None:  # closed: writing fails, same as on /dev/full
         sys.stdout = os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")
     if sys.stderr is None:
         sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
@@ -102,7 +102,7 @@ def show(
             say_json(answer if document is None else document, **more)
         else:
             parts = answer if isinstance(answer, list | tuple) else [answer]
-            say(*parts, *(part for each in more.values() for part in ("", each)))
+            say(*parts, *(part for further in more.values() for part in ("", further)))
     for path in written:
         to_stderr(f"written: {path}")
     if getattr(answer, "interrupted", False):
@@ -117,12 +117,12 @@ def say_written(file: Path) -> None:
 
 
 def put(text: str) -> None:
-    """Write a text that ends its own lines; errors as of `say`."""
+    """Write a text that ends its own lines; for errors, see `say`."""
     _guarded(lambda: (sys.stdout.write(text), sys.stdout.flush()))
 
 
 def say_json(value: DataclassInstance | Mapping[str, object], **more: object) -> None:
-    """Print a document or a result as JSON, with more keys; errors as of `say`."""
+    """Print a document or a result as JSON, with more keys; for errors, see `say`."""
     from robot_dyn.foundations.result import json_text, plain
 
     put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), json_text(plain(value) | more)))
@@ -161,7 +161,7 @@ def logged_to_stderr() -> Iterator[None]:
 
 
 def finish() -> None:
-    """Write what is left in the buffers, before the interpreter does; errors as of `say`."""
+    """Write the rest of the buffers, before the interpreter does; for errors, see `say`."""
     _guarded(sys.stdout.flush)
 
 

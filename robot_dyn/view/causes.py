@@ -31,7 +31,7 @@ def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
     at = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), _MOST)).round().astype(int))]
     limits = effort_limits(run, robot.effort_limit)
     of_joints = zip(split.joints, split.types, limits, np.moveaxis(parts[:, at], 2, 0), strict=True)
-    return {"t": split.t[at], "names": list(split.torques), "joints": [_joint(*each) for each in of_joints]}
+    return {"t": split.t[at], "names": list(split.torques), "joints": [_joint(*columns) for columns in of_joints]}
 
 
 def resolution(entry: dict[str, Any]) -> str:

@@ -35,7 +35,7 @@ class Canvas:
     def commands(self) -> list[Command]:
         """All commands, the animation last."""
         clips = [
-            {"path": path, "clip": {"name": path, "fps": 1, "tracks": each}} for path, each in self._tracks.items()
+            {"path": path, "clip": {"name": path, "fps": 1, "tracks": entry}} for path, entry in self._tracks.items()
         ]
         options = {"play": True, "repetitions": 1}
         return [*self._commands, {"type": "set_animation", "animations": clips, "options": options, "path": "replay"}]
@@ -147,7 +147,7 @@ def packed(content: bytes) -> str:
 
 
 def _geometry(attributes: Command, **index: Command) -> Command:
-    name = _name(*(each["array"].tobytes() for each in (*attributes.values(), *index.values())))
+    name = _name(*(entry["array"].tobytes() for entry in (*attributes.values(), *index.values())))
     return {"uuid": name, "type": "BufferGeometry", "data": {"attributes": attributes} | index}
 
 

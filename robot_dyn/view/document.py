@@ -1,6 +1,6 @@
 """The document of a page, from which it is drawn: runs as they were simulated, or a robot at one configuration.
 
-The first run is drawn opaque, the others as ghosts. Problems list what is drawn otherwise than the files describe.
+The first run is drawn opaque, the others as ghosts. Problems list parts that differ from the files.
 """
 
 from __future__ import annotations
@@ -69,12 +69,12 @@ class Shown:
     hidden: int
 
 
-@np.errstate(all="ignore")  # what is far out is drawn as far as it can be
+@np.errstate(all="ignore")  # huge positions are drawn as far as possible
 def document_of(
     runs: tuple[TrajectoryData, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
     meshes: str = "full",
 ) -> dict[str, Any]:  # fmt: skip
-    """Return the document of runs; arguments as of `replay`.
+    """Return the document of runs; for arguments, see `replay`.
 
     Raises:
         ReplayError: If a run has no samples.
@@ -86,49 +86,49 @@ def document_of(
     instance("frame", frame, str | None, "give the name of a link, or None")
     names = run_names(*runs)
     shown = [_shown(number, run, names, package_dirs, inertia, meshes) for number, run in enumerate(runs)]
-    if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
+    if frame is not None and all(frame not in item.stage.linkage.links for item in shown):
         shown[0].stage.link_path(frame)  # raises, with the nearest names
     first = shown[0]
-    page = _Document(np.concatenate([_corners(each, inertia) for each in shown]), first.stage.robot, inertia)
+    page = _Document(np.concatenate([_corners(item, inertia) for item in shown]), first.stage.robot, inertia)
     radius = page.scenery.radius
     remarks, problems = [], []
-    for each in shown:
-        run, stage, start = each.run, each.stage, len(page.notes)
-        page.draw(stage, each.drawing, each.keys)
+    for item in shown:
+        run, stage, start = item.run, item.stage, len(page.notes)
+        page.draw(stage, item.drawing, item.keys)
         traced = frame if frame in stage.linkage.links else run.about.get("frame") or stage.tip  # of another robot
         stage.link_path(traced)  # raises if there is none
-        frames, note = draw_paths(page.canvas, stage, each.motion, radius, traced)
+        frames, note = draw_paths(page.canvas, stage, item.motion, radius, traced)
         page.paths[stage.root] = {"frames": frames, "shown": traced}
         joints = {joint.joint: "rad" if joint.revolute else "m" for joint in stage.linkage.bodies}
-        page.notes.append(stated_error(run, each.motion, each.keys, joints))
+        page.notes.append(stated_error(run, item.motion, item.keys, joints))
         if len(run.events) > _MOST_EVENTS:
             page.notes.append(f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots")
-        page.notes += [*each.drawing.remarks, note, *draw_stops(page.canvas, stage, run, radius)]
-        page.notes[start:] = [each.prefix + text for text in page.notes[start:]]
-        if each.hidden:
-            hidden = f"the last {each.hidden} samples are not shown: not finite, or beyond {_FAR:g}"
-            problems.append(each.prefix + hidden)
-        problems += [each.prefix + text for text in each.drawing.notes]
-        remarks += [each.prefix + line for line in remark_lines(run.remarks)]
-    page.notes += draw_arrows(page.canvas, [(each.stage, each.run) for each in shown], radius)
+        page.notes += [*item.drawing.remarks, note, *draw_stops(page.canvas, stage, run, radius)]
+        page.notes[start:] = [item.prefix + text for text in page.notes[start:]]
+        if item.hidden:
+            hidden = f"the last {item.hidden} samples are not shown: not finite, or beyond {_FAR:g}"
+            problems.append(item.prefix + hidden)
+        problems += [item.prefix + text for text in item.drawing.notes]
+        remarks += [item.prefix + line for line in remark_lines(run.remarks)]
+    page.notes += draw_arrows(page.canvas, [(item.stage, item.run) for item in shown], radius)
     if split := causes(first.run, first.stage.robot):
         split["whose"] = first.name if len(shown) > 1 else ""
         page.notes.append(resolution(split))
-    named = [(each.name, each.run) for each in shown]
+    named = [(item.name, item.run) for item in shown]
     return page.entries(
         title=_title(shown),
-        outcome="; ".join(_outcome(each) for each in shown),
-        duration=max(float(each.run.t[-1]) for each in shown),
+        outcome="; ".join(_outcome(item) for item in shown),
+        duration=max(float(item.run.t[-1]) for item in shown),
         remarks=remarks,
         problems=problems,
         gravity=_labels(shown),
         events=[
-            {"t": event.t, "name": each.prefix + event.name}
-            for each in shown
-            for event in each.run.events[:_MOST_EVENTS]
+            {"t": event.t, "name": item.prefix + event.name}
+            for item in shown
+            for event in item.run.events[:_MOST_EVENTS]
         ],
-        rests=[lane for each in shown for lane in lanes(each.run, each.prefix, _MOST_EVENTS)],
-        plots=plots([each.run for each in shown], [each.stage for each in shown], [each.name for each in shown]),
+        rests=[lane for item in shown for lane in lanes(item.run, item.prefix, _MOST_EVENTS)],
+        plots=plots([item.run for item in shown], [item.stage for item in shown], [item.name for item in shown]),
         differs=settings_table(named),
         causes=split,
         price=cost_table(named),
@@ -138,7 +138,7 @@ def document_of(
 def still(
     robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], inertia: bool, meshes: str
 ) -> dict[str, Any]:
-    """Return the document of a robot at one configuration; arguments as of `show`.
+    """Return the document of a robot at one configuration; for arguments, see `show`.
 
     Raises:
         QueryError: If q is not one configuration of the robot.
@@ -169,7 +169,7 @@ def still(
 
 
 class _Document:
-    """What documents of runs and of robots have in common: a scene to which robots are added, and notes."""
+    """The common part of documents of runs and of robots: a scene to which robots are added, and notes."""
 
     def __init__(self, points: np.ndarray, robot: Robot, inertia: bool) -> None:
         """Begin the scene of points (k, 3) in the base of the first robot, whose gravity points down."""
@@ -202,8 +202,8 @@ def _outcome(shown: Shown) -> str:
 
 def _title(shown: list[Shown]) -> str:
     """The robot of one run; names of several, with how they are drawn."""
-    first, *others = (each.name for each in shown)
-    robots = list(dict.fromkeys(each.stage.robot.name for each in shown))
+    first, *others = (item.name for item in shown)
+    robots = list(dict.fromkeys(item.stage.robot.name for item in shown))
     prefix = f"{robots[0]}: " if len(robots) == 1 else ""
     return f"{prefix}{first} / {', '.join(others)} (transparent, dashed)" if others else first
 
@@ -236,7 +236,7 @@ def _drawable(run: TrajectoryData) -> TrajectoryData:
 
 
 def _corners(shown: Shown, inertia: bool) -> np.ndarray:
-    """Corners (k, 3) in the base of what is drawn, at a few keyframes."""
+    """Return the corners of the drawing in the base frame at a few keyframes, (k, 3)."""
     few = np.unique(np.linspace(0, len(shown.keys.t) - 1, 12).round().astype(int))
     at = np.searchsorted(shown.run.t, shown.keys.t[few]).clip(0, len(shown.run.t) - 1)
     return shown.stage.corners(shown.drawing.seen(inertia), shown.run.q[at])
@@ -246,8 +246,8 @@ def _labels(shown: list[Shown]) -> str:
     """Gravity of the first run, and of others where it differs."""
     first = shown[0].stage.robot
     others = [
-        f"{each.name}: {each.stage.robot.edits.gravity} m/s²"
-        for each in shown[1:]
-        if each.stage.robot.edits.gravity != first.edits.gravity
+        f"{item.name}: {item.stage.robot.edits.gravity} m/s²"
+        for item in shown[1:]
+        if item.stage.robot.edits.gravity != first.edits.gravity
     ]
     return "; ".join([gravity_label(first), *others])

@@ -99,7 +99,7 @@ def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Key
 
 
 def stated_error(run: TrajectoryData, motion: Motion, keys: Keyframes, units: Mapping[str, str]) -> str:
-    """How far keyframes are off the motion, and that from what is recorded; units of the joints by name."""
+    """Return a note on the errors of keyframes and of the recorded motion; `units` of the joints by name."""
     worst = int(keys.error.argmax())
     name, unit = list(units.items())[worst]
     text = (

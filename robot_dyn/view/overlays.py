@@ -1,6 +1,6 @@
 """Overlays of a replay: p_com = Σ mᵢ pᵢ / Σ mᵢ, the paths of frames, stops, and arrows of external wrenches (f, τ).
 
-Paths are thinned like joints: a straight line replaces the samples between keyframes, to a part of what is seen.
+Paths are thinned like joints: a straight line replaces the samples between keyframes, to a fraction of the scene.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from robot_dyn.view.stage import Stage, plain
 _COM: Rgba = (0.94, 0.89, 0.26, 1.0)
 _TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
 _STOP: Rgba = (0.9, 0.05, 0.05, 0.75)
-_PART = 5e-4  # of what is seen: how far a path may be off between keyframes
-_LONGEST = 0.4  # of the radius of what is seen: the arrow of the largest force or torque of all runs
+_PART = 5e-4  # of the scene: largest error of a path between keyframes
+_LONGEST = 0.4  # of the radius of the scene: the arrow of the largest force or torque of all runs
 _WRENCH: tuple[tuple[str, str, slice, str, Rgba], ...] = (
     ("force", "orange", slice(1, 4), "N", (0.84, 0.37, 0.0, 1.0)),
     ("torque", "pink", slice(4, 7), "N m", (0.8, 0.47, 0.65, 1.0)),
@@ -33,7 +33,7 @@ def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame
         canvas: Where to.
         stage: Where the robot stands.
         motion: Its samples and what lies between them.
-        reach: Radius of what is seen, in [m].
+        reach: Radius of the scene, in [m].
         frame: Link whose path is shown at first.
 
     Returns:

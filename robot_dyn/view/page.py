@@ -39,7 +39,7 @@ class Page:
     picture of its first instant where frames are removed. At a prompt, `repr` gives its address.
 
     Attributes:
-        document: What it consists of.
+        document: Contents of the page, for its script.
     """
 
     document: Mapping[str, Any]
@@ -52,7 +52,7 @@ class Page:
 
     @cached_property
     def text(self) -> str:
-        """Its HTML."""
+        """HTML of the page."""
         return page_text({**self.document, "live": False})
 
     @cached_property
@@ -99,7 +99,7 @@ class Page:
             size: Width and height in pixels, even numbers from 160 to 3840.
             dark: Whether it is drawn for dark screens.
             browser: Path of the browser; the first of this machine if not given.
-            on_progress: Called with the part that is done, from 0 to 1, and with what is being done, in another thread.
+            on_progress: Called with the finished part, 0 to 1, and the name of the work, in another thread.
 
         Raises:
             VideoError: If the page has no run, the video is too long, no browser is installed or shows the page, or
@@ -112,7 +112,7 @@ class Page:
         return save_video(text, duration, path, fps, size, dark, browser, on_progress)
 
     def serve(self, port: int | None = None) -> Server:
-        """Serve it live, on this machine only, at the `url` of what is returned, until that is closed.
+        """Serve the page live, on this machine only, at the `url` of the returned server, until that is closed.
 
         Other meshcat programs may draw into the scene, at its `zmq_url`.
 

@@ -18,7 +18,7 @@ from robot_dyn.view.commands import Command
 WIDTH, HEIGHT, _FINE = 720, 480, 2  # [pixels]; drawn larger by the last, and reduced: smooth edges
 _TOP, _BOTTOM = (245, 247, 250), (209, 217, 224)  # of the page's background
 _HALF = np.tan(np.deg2rad(45.0) / 2)  # half of the height that is seen at a distance of 1, as on the page
-_MARGIN = 0.9  # of the picture, for what is seen, as on the page
+_MARGIN = 0.9  # of the picture, for the scene, same as on the page
 _LIGHT = np.array([0.4, -0.5, 0.77])
 
 
@@ -96,8 +96,8 @@ class _Tree:
             elif command["type"] == "set_property" and command["property"] == "visible" and not command["value"]:
                 self._hidden.add(command["path"])
             elif command["type"] == "set_animation":
-                for each in command["animations"]:
-                    self._start(each["path"], {track["name"]: track["values"] for track in each["clip"]["tracks"]})
+                for part in command["animations"]:
+                    self._start(part["path"], {track["name"]: track["values"] for track in part["clip"]["tracks"]})
 
     def _start(self, path: str, tracks: dict[str, Any]) -> None:
         from scipy.spatial.transform import Rotation
@@ -111,12 +111,12 @@ class _Tree:
             self._hidden.add(path)
 
     def seen(self, path: str) -> bool:
-        """Whether neither the node nor one above it is hidden."""
+        """Return True if neither the node nor a node above it is hidden."""
         return self._hidden.isdisjoint(_above(path))
 
     def placement(self, path: str) -> np.ndarray:
         """Placement (4, 4) of a node in the scene."""
-        return reduce(np.matmul, (self._local.get(each, np.eye(4)) for each in _above(path)))
+        return reduce(np.matmul, (self._local.get(part, np.eye(4)) for part in _above(path)))
 
 
 def _above(path: str) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
-_HOLD = {"dry_friction", "rigid_stops"}  # among the names of what acts
+_HOLD = {"dry_friction", "rigid_stops"}  # names of effects that hold joints
 _MOST = 200  # of a joint
 
 
@@ -34,11 +34,11 @@ def rests(run: TrajectoryData) -> tuple[tuple[Rest, ...], ...]:
     names = run.joint_names
     if not _HOLD & set(run.acting or ()):
         return ((),) * len(names)
-    events = [each for each in run.events if len(each.q) == len(names)]
-    t = np.concatenate([run.t, [each.t for each in events]])
+    events = [event for event in run.events if len(event.q) == len(names)]
+    t = np.concatenate([run.t, [event.t for event in events]])
     order = np.argsort(t, kind="stable")
     q, v = (
-        np.concatenate([x, np.array([getattr(each, name) for each in events]).reshape(-1, len(names))])[order]
+        np.concatenate([x, np.array([getattr(event, name) for event in events]).reshape(-1, len(names))])[order]
         for name, x in (("q", run.q), ("v", run.v))
     )
     return tuple(_of_joint(run, i, t[order], q[:, i], v[:, i]) for i in range(len(names)))
@@ -49,7 +49,7 @@ def lanes(run: TrajectoryData, prefix: str, most_events: int) -> Iterator[dict[s
     for name, spans in zip(run.joint_names, rests(run), strict=True):
         if spans:
             events = [(event.t, event.name) for event in run.events if event.joint == name]
-            yield {"joint": prefix + name, "spans": [list(each) for each in spans], "events": events[:most_events]}
+            yield {"joint": prefix + name, "spans": [list(event) for event in spans], "events": events[:most_events]}
 
 
 def _of_joint(run: TrajectoryData, i: int, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[Rest, ...]:

@@ -18,18 +18,18 @@ from robot_dyn.view.geometry.shapes import arrow
 
 _GROUND = (0.7, 0.73, 0.77, 1.0)
 _GRAVITY = (0.42, 0.24, 0.6, 1.0)  # violet
-_CORNER = np.array([0.67, -0.67, 0.32])  # default direction of the camera, from the middle of what is seen
+_CORNER = np.array([0.67, -0.67, 0.32])  # default direction of the camera, from the middle of the scene
 _POINT = 1e-9  # [m], below which nothing has a size
-_FRONTAL = 1.2  # how far it moves to the front of what is flat
+_FRONTAL = 1.2  # how far it moves to the front of a flat scene
 _OUTWARD = np.array([d for d in product(range(-2, 3), repeat=3) if any(d)], dtype=float)  # directions of an outline
-_ARROW = 0.3  # length of the arrow of gravity, in radii of what is seen
-_FLOOR = 1.5  # its half width, in radii of what is seen
+_ARROW = 0.3  # length of the arrow of gravity, in radii of the scene
+_FLOOR = 1.5  # its half width, in radii of the scene
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Scenery:
-    """What is seen.
+    """The visible scene.
 
     Attributes:
         center: Of a sphere about it, (3,), in [m].
@@ -52,7 +52,7 @@ class Scenery:
 
     @property
     def aside(self) -> np.ndarray:
-        """A place at the left of what is seen, where the arrow of gravity starts, (3,)."""
+        """A place at the left of the scene, where the arrow of gravity starts, (3,)."""
         left = np.cross(self.camera, [0.0, 0.0, 1.0])
         length = np.linalg.norm(left)
         left = left / length if length > 1e-6 else np.array([-1.0, 0.0, 0.0])  # seen from above
@@ -60,14 +60,14 @@ class Scenery:
         return self.center + away * left + [0.0, 0.0, _ARROW * self.radius]
 
     def as_json(self) -> dict[str, Any]:
-        """What the page needs for its camera; the arrow of gravity is in view."""
+        """Data for the camera of the page; the arrow of gravity is in view."""
         seen = np.vstack([self.outline, self.aside, self.aside - [0.0, 0.0, _ARROW * self.radius]])
         places = {"center": self.center, "camera": self.camera, "outline": seen}
-        return {"radius": self.radius} | {name: each.tolist() for name, each in places.items()}
+        return {"radius": self.radius} | {name: place.tolist() for name, place in places.items()}
 
 
 def scenery(points: np.ndarray) -> Scenery:
-    """About points (k, 3); what is flat is seen more from its front than what is not."""
+    """Return the scene around points (k, 3); a flat one is seen more from its front."""
     low, high = points.min(axis=0), points.max(axis=0)
     center = (low + high) / 2
     radius = float(np.linalg.norm(points - center, axis=1).max())
@@ -92,7 +92,7 @@ def upright(gravity: tuple[float, float, float]) -> np.ndarray:
 
 
 def surround(canvas: Canvas, seen: Scenery, gravity: tuple[float, float, float]) -> None:
-    """Draw squares on the floor, and an arrow down at the left of what is seen; none without gravity."""
+    """Draw squares on the floor, and an arrow down at the left of the scene; none without gravity."""
     middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(_FLOOR * seen.radius / seen.square))
     ticks = np.arange(-count, count + 1)
     x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")  # each edge is a line: viewers drop lines behind the camera

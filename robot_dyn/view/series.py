@@ -3,7 +3,7 @@
 Ledger: E(t) − E(0) = Σ W_k + residual.
 
 Long runs are thinned: of each bucket of samples the least and the largest of each column stay, so no peak is lost.
-A plot whose curves are all 0, or all absent, has no series and says why.
+A plot whose curves are all 0, or all absent, has no series; the reason is stated.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
         }
         for curve in curves
     ]
-    every = np.concatenate([np.zeros(0), *(each["values"] for each in series)])
+    every = np.concatenate([np.zeros(0), *(curve["values"] for curve in series)])
     is_drawn = bool(np.nan_to_num(every).any())
     why = "0 throughout" if not np.isnan(every).all() else "not recorded" if series else "no common samples"
     plot = {"title": title, "unit": unit, "t": t, "limits": [], "beyond": ""}

@@ -24,7 +24,7 @@ def sliders(stage: Stage, q: np.ndarray) -> dict[str, Any]:
     of_joints = zip(robot.joint_names, robot.joint_types, q, robot.lower, robot.upper, robot.effort_limit, strict=True)
     of_bodies = zip(linkage.bodies, linkage.inertias, stage.paths, strict=True)
     return {
-        "joints": [_joint(*each) for each in of_joints],
+        "joints": [_joint(*columns) for columns in of_joints],
         "bodies": [
             {
                 "path": path,

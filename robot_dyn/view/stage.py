@@ -30,11 +30,11 @@ _CHUNK = 20_000  # samples whose placements are held at a time
 @final
 @dataclass(frozen=True)
 class Stage:
-    """Where the parts of a robot stand in the viewer's tree.
+    """The places of the parts of a robot in the viewer's tree.
 
     Attributes:
         root: Path of the robot.
-        robot: What is shown.
+        robot: The robot.
         opacity: Of all that is drawn there.
     """
 

@@ -1,4 +1,4 @@
-"""Tables of runs: in what their settings differ; what they took, and the cost of one digit more or fewer."""
+"""Tables of runs: their differing settings, their cost, and the cost of one digit more or fewer."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _MOST_SETTINGS = 60
 
 
 def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
-    """The settings in which runs of one robot differ from the first, as of `cost_table`; no rows for others."""
+    """Return the settings in which runs of one robot differ from the first; for others, no rows."""
     (_, first), *others = named
     if any(not comparable(first, other) for _, other in others):
         return {"runs": [], "rows": []}
-    pairs = [{each.name: each for each in differing_settings(first, other)} for _, other in others]
+    pairs = [{setting.name: setting for setting in differing_settings(first, other)} for _, other in others]
     rows = []
     for name in list(dict.fromkeys(name for pair in pairs for name in pair))[:_MOST_SETTINGS]:
         of_first = next(pair[name].a for pair in pairs if name in pair)

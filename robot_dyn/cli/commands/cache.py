@@ -27,7 +27,7 @@ def cache(clear: bool = False, as_json: Json = False) -> None:
     answer = {
         "folder": str(store.folder) if store else None,
         "removed": removed,
-        "bytes": sum(each.size for each in kernels),
+        "bytes": sum(kernel.size for kernel in kernels),
         "kernels": kernels,
     }
     show([*_lines(answer)], as_json=as_json, document=answer)
@@ -42,9 +42,9 @@ def _lines(answer: dict[str, Any]) -> Iterator[Any]:
         yield f"removed: {answer['removed']} kernels"
     if answer["kernels"]:
         rows = []
-        for each in answer["kernels"]:
-            used = datetime.fromtimestamp(each.used).strftime("%Y-%m-%d %H:%M")
-            rows.append((each.key[:12], each.about, f"{each.size / 1024:.0f}", used))
+        for kernel in answer["kernels"]:
+            used = datetime.fromtimestamp(kernel.used).strftime("%Y-%m-%d %H:%M")
+            rows.append((kernel.key[:12], kernel.about, f"{kernel.size / 1024:.0f}", used))
         yield Table(("kernel", "about", "KiB", "last used"), tuple(rows), right=("KiB",))
     count = len(answer["kernels"])
     yield f"{count} kernel{'' if count == 1 else 's'}, {answer['bytes'] / 2**20:.1f} MiB in {answer['folder']}"

@@ -1,4 +1,4 @@
-"""Commands that say what digits, effects and algorithms cost, and whether steps are short enough."""
+"""Commands for the cost of digits, effects and algorithms, and for the choice of steps."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def work_precision(
     Options:
         what (SCENE.toml|ROBOT): A scene file; or a robot, which then swings freely.
         method (METHOD): Only this method; may be repeated; all by default.
-        peers: Run other programs that are installed beside, where they can.
-        q: Start of a robot: as of query; random by default.
+        peers: Also run other installed programs, where they can.
+        q: Start of a robot, same as in query; random by default.
         v: Its velocities; 0 by default.
         duration (SECONDS): Of its motion; 1 by default.
     """
@@ -87,7 +87,7 @@ def certify(
         samples: Number of random states.
         seed: Of the random states.
         repeats: How often each query is timed.
-        q: A state to look at too: as of query.
+        q: A further state to examine, same as in query.
         v: Its velocities; 0 by default.
         a: Its accelerations, of inverse dynamics; 0 by default.
         tau: Its torques, of forward dynamics; 0 by default.
@@ -103,7 +103,7 @@ def certify(
 
 @command(RUN)
 def advise(scene: Scene, /, as_json: Json = False) -> None:
-    """Say whether step and control period are short enough.
+    """Check whether step and control period are short enough.
 
     Also what error to expect. The exit code is 1 if they are not short enough.
     """

@@ -70,7 +70,7 @@ def demo(output: str = "demo", force: Force = False) -> None:
 
 
 def _price(swing: rd.Setup) -> Iterator[str]:
-    """What digits of a free swing cost, here and now."""
+    """Measure the cost of digits of a free swing on this machine."""
     from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
 
     yield ""

@@ -29,7 +29,7 @@ def info(robot: Name, /, compiled: bool = False, options: RobotOptions = AS_STAT
     """Show a robot: joints, limits, friction, mass, findings.
 
     Options:
-        compiled: Also trace each quantity, and say which formulation is compiled.
+        compiled: Also trace each quantity, and print which formulation is compiled.
     """
     from robot_dyn.cli import report
     from robot_dyn.foundations.result import plain
@@ -83,7 +83,7 @@ def query(
     setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.stated)
     if setup is None:
         robot = options.load(what)
-        robot = robot.with_(payload=[arguments.payload(each) for each in payload]) if payload else robot
+        robot = robot.with_(payload=[arguments.payload(text) for text in payload]) if payload else robot
         plant = rd.Plant(robot, effects or ())
     else:
         plant = setup.plant.at(0.0)
@@ -103,7 +103,7 @@ def query(
 
 
 def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """What the control of a setup does at t = 0, within the bounds of the plant, (n,)."""
+    """Return the actuation of a setup at t = 0, within the bounds of the plant, (n,)."""
     from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
     equation = StateEquation(setup.plant, setup.controller)

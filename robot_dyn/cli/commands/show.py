@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True)
 class PageOptions:
-    """How a page is drawn, and whether it is written or served.
+    """Options of a page: how it is drawn, and whether it is written or served.
 
     Options:
         html (OUT.html): Write one file that needs no server, and end.

@@ -59,7 +59,7 @@ def simulate(
 
 @command(ASK)
 def explain(scene: Scene, /, as_json: Json = False) -> None:
-    """Say what a scene integrates, and where numbers came from."""
+    """Print the equation that a scene integrates, and the source of each number."""
     show(rd.explain(Path(scene)), as_json=as_json)
 
 
@@ -83,4 +83,5 @@ def scene(name: Annotated[str | None, typer.Argument(autocompletion=completion.s
     if name:
         put(starter(name))
     else:
-        say(Table(("scene", "what it is"), tuple((each, opening(each)) for each in starter_names()), wrap=True))
+        rows = tuple((starter_name, opening(starter_name)) for starter_name in starter_names())
+        say(Table(("scene", "content"), rows, wrap=True))

@@ -28,9 +28,9 @@ def coarse(mesh: Mesh) -> Mesh:
     low = points.min(axis=0)
     cells = np.floor((points - low) * (CELLS / np.ptp(points, axis=0).max()))
     _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    means = np.stack([np.bincount(cell, each) for each in points.T], axis=1) / count[:, None]
-    columns = (None if each is None else each[mesh.faces] for each in (mesh.uv, mesh.colors))
-    return welded(means[cell[mesh.faces]], None, *columns) or mesh  # which leaves out what has no area
+    means = np.stack([np.bincount(cell, values) for values in points.T], axis=1) / count[:, None]
+    columns = (None if values is None else values[mesh.faces] for values in (mesh.uv, mesh.colors))
+    return welded(means[cell[mesh.faces]], None, *columns) or mesh  # without triangles of no area
 
 
 def look_of(robot: Robot, package_dirs: Iterable[str | Path], inertia: bool, meshes: str) -> Drawing:
@@ -44,7 +44,7 @@ def _coarsened(look: Drawing) -> Drawing:
     """A drawing with its meshes coarse; pieces that share one still do."""
     meshes = {id(piece.mesh): piece.mesh for piece in look.pieces}
     known = {key: coarse(mesh) for key, mesh in meshes.items()}
-    before, after = (sum(len(each.faces) for each in some.values()) for some in (meshes, known))
+    before, after = (sum(len(values.faces) for values in some.values()) for some in (meshes, known))
     remark = (
         f"meshes are coarse: {after} of {before} triangles, corners moved by up to {np.sqrt(3) / CELLS:.1%} of a mesh"
     )

@@ -1,6 +1,6 @@
-"""What a robot looks like: every <visual> of its URDF as pieces of triangles fastened to links.
+"""The appearance of a robot: every <visual> of its URDF as pieces of triangles fastened to links.
 
-A piece stands at g_link · pose. A note says what cannot be drawn as described, and what is drawn instead: the
+A piece stands at g_link · pose. A note reports a visual that cannot be drawn as described, and its replacement: the
 collision shape of the link, otherwise the ellipsoid of its inertia.
 """
 
@@ -27,8 +27,8 @@ from robot_dyn.shapes.triangles import Mesh
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
 from robot_dyn.view.geometry.shapes import PRIMITIVES
 
-GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # of what has no material; rviz takes red
-_STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of what is drawn in place of a visual
+GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # without material; rviz uses red
+_STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of a replacement
 _INERTIA: Rgba = (0.2, 0.4, 1.0, 0.35)
 _DOUBTFUL: Rgba = (1.0, 0.15, 0.1, 0.5)
 _Y_UP_REMARKS = {  # of files that are read the other way than usual
@@ -65,8 +65,8 @@ class Drawing:
     """The look of a robot.
 
     Attributes:
-        pieces: What is drawn.
-        notes: What could not be drawn as described.
+        pieces: Pieces of the drawing.
+        notes: Visuals that could not be drawn as described.
         remarks: What else a reader should know.
         boxes: The uniform box with the mass and moments of each body that moves, payloads included.
     """
@@ -87,7 +87,7 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
     Args:
         robot: The robot; its edits do not change its look.
         package_dirs: Searched first; then folders above the file, ROS_PACKAGE_PATH, the installed example-robot-data.
-        inertia: Whether its boxes of inertia are shown: a note then says which of them are not as described.
+        inertia: Whether its boxes of inertia are shown: a note then lists those that are not as described.
 
     Returns:
         Pieces and notes; a mesh that is missing or damaged is noted and replaced, not raised.
@@ -111,7 +111,7 @@ def solids(
 
     Args:
         robot: The robot.
-        package_dirs: As of `drawing`.
+        package_dirs: See `drawing`.
         kinds: The elements, in this order.
         links: Names of links; all of them if not given.
     """
@@ -155,7 +155,7 @@ class _Artist:
         return [(name, link) for name, link in named if name in self.checked]
 
     def upright(self, draw: Callable[[], T]) -> T:
-        """What is drawn; drawn again if files with y up, turned or not, stand nearer to masses the other way."""
+        """Return a drawing; draw again if files with y up, turned or not, stand nearer to masses the other way."""
         drawn = draw()
         wrong = frozenset(each for each in _Y_UP_REMARKS if self._nearer_the_other_way(each))
         if not wrong:

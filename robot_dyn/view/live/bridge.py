@@ -27,7 +27,7 @@ _MAX_MESSAGE = 2**28  # [bytes]
 
 
 class _RequestError(Exception):
-    """Internal: a request that has no answer; the message says why."""
+    """Internal: a request that has no answer; the message has the reason."""
 
 
 class Browser(Protocol):
@@ -70,7 +70,7 @@ class Bridge:
 
     Attributes:
         url: Where requests arrive.
-        scene: What is drawn.
+        scene: The drawn scene.
     """
 
     def __init__(self, commands: list[Command], web_url: str) -> None:
@@ -151,7 +151,7 @@ class Bridge:
             raise _RequestError(f"{kind} takes a path and a message, got {len(frames)} frames")
         try:
             command = umsgpack.unpackb(frames[1])
-        except Exception as error:  # of whatever stands in the message
+        except Exception as error:  # from any content of the message
             raise _RequestError(f"{kind}: the message is not MessagePack ({type(error).__name__})") from None
         if not isinstance(command, dict) or command.get("type") != kind or not isinstance(command.get("path"), str):
             raise _RequestError(f"the message must have the type {kind!r} and a path that is text")

@@ -1,4 +1,4 @@
-"""What figures of a batch show: quantiles over time, how runs ended, a figure of each run, and it over a parameter.
+"""The parts of figures of a batch: quantiles over time, how runs ended, a figure of each run, and it over a parameter.
 
 Bands are of the runs that did not diverge; those that did are drawn by themselves and counted.
 """
@@ -41,7 +41,7 @@ class BatchView:
 
     @property
     def lost(self) -> str:
-        """How many runs diverged."""
+        """The number of diverged runs as the end of a heading; empty if there are none."""
         count = int(self.runs.diverged.sum())
         return f"; {count} of {len(self.runs)} diverged" if count else ""
 
@@ -49,7 +49,7 @@ class BatchView:
 @final
 @dataclass(frozen=True, eq=False)
 class Bars(Axes):
-    """Counts between `edges`; `lost` of what diverged, beside them. Without edges each count has a name."""
+    """Counts between `edges`; `lost` for the diverged runs, next to them. Without edges each count has a name."""
 
     counts: np.ndarray
     edges: np.ndarray | None = None
@@ -112,7 +112,7 @@ def tracking(view: BatchView) -> list[Panel]:
 
 
 def outcomes(view: BatchView) -> list[Panel]:
-    """How many runs finished, ended by an event, diverged, or were stopped."""
+    """Return counts of runs that finished, ended by an event, diverged, or were stopped."""
     runs = view.runs
     by_event = np.array([outcome.reason is Reason.TERMINAL_EVENT for outcome in runs.ends])
     kinds = {"ended by an event": by_event, "diverged": runs.diverged, "stopped": runs.stopped}
@@ -123,7 +123,7 @@ def outcomes(view: BatchView) -> list[Panel]:
 
 
 def histogram(view: BatchView) -> list[Panel]:
-    """How often a figure of the runs has which value; by default the rms tracking error, else the first extreme."""
+    """Return the histogram of a figure of the runs; by default the rms tracking error, else the first extreme."""
     name, values = _column(view.runs, "y", view.y, ("rms tracking error", "largest", "ended"))
     some = np.isfinite(values) & ~view.runs.diverged
     if not some.any():
@@ -134,7 +134,7 @@ def histogram(view: BatchView) -> list[Panel]:
 
 
 def scatter(view: BatchView) -> list[Panel]:
-    """A figure of the runs over what was swept; by default as `histogram`, over the first column that differs.
+    """Return a scatter of a figure of the runs over a varied parameter, by default the first column that differs.
 
     Raises:
         PlotError: If nothing differs from run to run.

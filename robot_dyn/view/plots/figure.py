@@ -1,6 +1,6 @@
 """Cells of a figure: one pair of axes each, with curves, limits, marks and scales, in the style of a figure.
 
-Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and beside other figures.
+Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and next to other figures.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ DESIRED = 1, 1  # colour and dashes of desired values
 @final
 @dataclass(frozen=True, eq=False)
 class Style:
-    """How a figure is drawn.
+    """Style of a figure.
 
     Attributes:
         colours: Of paper, ink, grid and lines, as in `THEMES`.
         heading, text, small: Sizes of headings, of titles, and of labels and numbers, in [pt].
         line: Width of a curve, in [pt].
-        titled: Whether it is headed by what it shows.
+        titled: True if the figure has a title.
     """
 
     colours: Mapping[str, Any]
@@ -56,7 +56,7 @@ class Style:
 
     @property
     def ink(self) -> dict[str, Any]:
-        """How text is written."""
+        """Options of text."""
         return {"color": self.colours["ink"], "parse_math": False}
 
 
@@ -86,7 +86,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """What stands on one pair of axes.
+    """Contents of one pair of axes.
 
     Attributes:
         title: Text above them.
@@ -102,7 +102,7 @@ class Axes:
     own_legend: bool = field(default=False, kw_only=True)
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
-        """Draw on axes of Matplotlib; `diverged` says that values may have grown without bound."""
+        """Draw on axes of Matplotlib; `diverged` is True if values may have grown without bound."""
         raise NotImplementedError
 
 
@@ -112,7 +112,7 @@ class Cell(Axes):
     """Curves and what explains them.
 
     Attributes:
-        curves: What is drawn; over time unless `x` names another quantity.
+        curves: Curves; over time unless `x` names another quantity.
         log: Whether y has a logarithmic scale.
         limit: Drawn at ±limit.
         until: What lies after this time is veiled.

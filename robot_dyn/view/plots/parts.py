@@ -1,4 +1,4 @@
-"""What figures of a run show: joints, torques against limits, energy ledger, tracking error, phase portrait, error.
+"""The parts of figures of a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error.
 
 The overview has a row for each joint, and a column for each of q, v, u and the tracking error.
 """
@@ -50,7 +50,7 @@ class View:
 
     @property
     def columns(self) -> int:
-        """Cells beside each other at most."""
+        """Largest number of cells in a row."""
         return int(self.width / _CELL_MM)
 
     def unit(self, quantity: str, i: int) -> str:
@@ -116,7 +116,7 @@ def energy(view: View) -> list[Panel]:
     if not ledger.known:
         raise PlotError("energy and work of the run were not recorded; add energy and work to record of rollouts")
     known = np.isfinite(ledger.residual).any() and np.isfinite(ledger.exchanged)
-    part = f": the residual is {ledger.closure:.1e} of what was exchanged" if known and ledger.exchanges else ""
+    part = f": the residual is {ledger.closure:.1e} of the exchanged energy" if known and ledger.exchanges else ""
     rows = in_rows(_ledger(view), 1)
     return [Panel(f"Energy ledger{part}", rows, every=len(rows))]
 
@@ -234,7 +234,7 @@ def _marks(run: TrajectoryData, i: int) -> tuple[float, ...]:
 
 
 def _legend(view: View, held: tuple[tuple[Rest, ...], ...]) -> str:
-    """What is drawn without an entry in a legend, for a heading."""
+    """Return the legend of marks without an entry in the legend, for a heading."""
     run, shown = view.run, [each for i in view.joints for each in held[i]]
     legend = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
     legend.append(("at a stop in colour", [each for each in shown if each.at_stop]))

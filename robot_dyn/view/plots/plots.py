@@ -99,7 +99,7 @@ def plot(
 
 
 def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
-    """Those parts of a batch, or all that apply."""
+    """Draw parts of a batch, or all that apply."""
     panels = []
     with np.errstate(all="ignore"):
         for name in parts or BATCH_PLOTS:
@@ -139,7 +139,7 @@ def _width(width_mm: float) -> float:
 
 
 def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tuple[int, ...]:
-    """Of the joints shown."""
+    """Return the columns of the shown joints."""
     columns = tuple(i for i, name in enumerate(run.joint_names) if name in shown)
     if not 0 < len(columns) <= MOST_JOINTS:
         count = f"{len(columns)} joints, and one figure shows 1 to {MOST_JOINTS}"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 WIDTH_MM, LEAST_MM, MOST_MM = 180.0, 80.0, 1000.0
 A4_MM, MM = 297.0, 1 / 25.4
 _HEADING, _BESIDE = 10.0, 14.0  # [mm]: about what a heading and a legend take, and what the y axis of a cell takes
-_LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, beside the text of a legend
+_LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, next to the text of a legend
 _RIGHT = 1.5  # [mm], free at the right for half of the last number of an x axis
 _LEAST_ROW = 20.0  # [mm], with its title and its numbers
 _MOST_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary

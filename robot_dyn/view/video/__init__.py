@@ -1,6 +1,6 @@
 """Videos of pages: an installed browser, without a window, shows the page at each time and takes its picture.
 
-video.py     `Page.save_video`: what is checked, times of the frames, the file
+video.py     `Page.save_video`: checks, times of the frames, the file
 browser.py   the Chrome, Chromium or Edge of this machine by Playwright: the page at times, as pictures
 encoders.py  MP4 and GIF by ffmpeg
 """

@@ -47,7 +47,7 @@ def installed(path: str | Path | None = None) -> Path | None:
     """The program of a browser: the one at `path`, or the first on the path or at a known place; None if there is none.
 
     Raises:
-        VideoError: If what is at `path` cannot be run.
+        VideoError: If the file at `path` cannot be run.
     """
     if path is None:
         found = next(filter(None, map(shutil.which, (*_NAMES, *_PROGRAMS))), None)
@@ -82,7 +82,7 @@ def frames(
             page.evaluate("film.begin()")
             for t in times.tolist():
                 if (shown := page.evaluate("(t) => film.show(t)", t)) != t:
-                    raise VideoError(f"the page shows t = {shown} s in place of {t} s")
+                    raise VideoError(f"the page shows t = {shown} s instead of {t} s")
                 yield page.screenshot()
     except api.Error as error:
         first, said = str(error).splitlines()[0].partition(": ")[2], re.findall(r"\[err\] (.*)", str(error))

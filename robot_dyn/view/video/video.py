@@ -37,7 +37,7 @@ def save_video(
     program: str | Path | None,
     on_progress: Callable[[float, str], object] | None,
 ) -> Path:
-    """Write the video of a page, given as its text; arguments and errors as of `Page.save_video`."""
+    """Write the video of a page, given as its text; for arguments and errors, see `Page.save_video`."""
     file = target(path, KINDS, VideoError)
     kind = file.suffix.lower()
     rate = integer("fps", _FPS[kind] if fps is None else fps, least=1, most=_MOST_FPS[kind], error=VideoError)
@@ -73,7 +73,8 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
     if not isinstance(size, tuple | list) or len(size) != 2:
         raise VideoError(f"size must be a width and a height in pixels, got {size!r}")
     width, height = (
-        integer(f"size[{k}]", each, least=_LEAST_SIZE, most=_MOST_SIZE, error=VideoError) for k, each in enumerate(size)
+        integer(f"size[{k}]", pixels, least=_LEAST_SIZE, most=_MOST_SIZE, error=VideoError)
+        for k, pixels in enumerate(size)
     )
     if width % 2 or height % 2:
         raise VideoError(

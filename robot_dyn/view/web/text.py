@@ -36,7 +36,7 @@ def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
 
     Args:
         document: Of `document` or `still`.
-        viewer: Name of a file beside the page with the text of `shared_viewer`; the viewer is in the page if empty.
+        viewer: Name of a file with the text of `shared_viewer`, next to the page; if empty, the viewer is in the page.
     """
     web = Path(__file__).parent
     meshcat = _viewer()

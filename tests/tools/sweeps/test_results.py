@@ -326,7 +326,7 @@ def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tm
         "def reached(t, q, v):\n    return q[0] - 0.45\n"
         "def setup():\n"
         "    arm = rd.load('planar_2r')\n"
-        "    control = rd.control.PD(rd.control.hold([0.6, 0.9]), 40.0, 4.0)\n"
+        "    control = rd.control.PD(rd.control.hold([0.6, 0.9]), kp=40.0, kd=4.0)\n"
         "    return rd.Setup(rd.Plant(arm), [0.4, 0.9], duration_s=0.1, controller=control, method='RK4',\n"
         "                    events=rd.Event(reached, terminal=True), record_every_s=0.001)\n"
     )
