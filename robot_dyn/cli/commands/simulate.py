@@ -59,7 +59,7 @@ def simulate(
 
 @command(ASK)
 def explain(scene: Scene, /, as_json: Json = False) -> None:
-    """Print the equation that a scene integrates, and the source of each number."""
+    """Print a scene's equation and the source of each number."""
     show(rd.explain(Path(scene)), as_json=as_json)
 
 

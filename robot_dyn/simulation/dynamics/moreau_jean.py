@@ -3,8 +3,8 @@
     M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r the impulses of friction and stops:  −r ∈ h f ∂|v⁺| + 𝓝(v⁺)
 
 at q_m = q + h/2 v, with 𝓝 the normal cone of the bounds of v⁺. The work of a force is its impulse times the mean
-velocity (v + v⁺)/2, so that the energy ledger contains the energy removed by stops and friction. Functions work on floats, or on symbols for machine code; see
-`integrate.time_stepping`.
+velocity (v + v⁺)/2, so that the energy ledger contains the energy removed by stops and friction. Functions work on
+floats, or on symbols for machine code; see `integrate.time_stepping`.
 """
 
 from __future__ import annotations
