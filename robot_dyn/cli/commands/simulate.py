@@ -65,7 +65,7 @@ def explain(scene: Scene, /, as_json: Json = False) -> None:
 
 @command(ASK)
 def parameters(scene: Scene, /, as_json: Json = False) -> None:
-    """List the parameters of a scene that can vary from run to run."""
+    """List the parameters of a scene that a sweep can vary."""
     show(rd.parameters(rd.read_scene(scene)), as_json=as_json)
 
 

@@ -184,6 +184,6 @@ def polynomial(z: Lanes, coefficients: tuple[float, ...]) -> Lanes:
 
 
 def align_stack(function: ir.Function) -> None:
-    """Align the vectors that a function stores on the stack to cache lines, whatever the alignment in the caller."""
+    """Align the vectors that a function stores on the stack to cache lines, even if the caller is less aligned."""
     function.attributes.add("nounwind")  # llvmlite omits the alignment without another attribute
     function.attributes.alignstack = LINE
