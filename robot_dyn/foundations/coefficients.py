@@ -35,10 +35,14 @@ class Jointed(Protocol):
     """An arm with named joints."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the arm."""
+        ...
 
     @property
-    def joint_names(self) -> tuple[str, ...]: ...
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of its joints, in the order of q."""
+        ...
 
 
 @final
