@@ -46,7 +46,7 @@ def run(
     folder: str | Path,
     *,
     threads: int | None = None,
-    cluster: Any = None,
+    cluster: object = None,
     job: str | None = None,
     chunk: int | None = None,
     on_progress: Progress | None = None,
