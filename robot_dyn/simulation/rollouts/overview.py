@@ -11,7 +11,15 @@ from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
-from robot_dyn.simulation.diagnostics.step_remarks import KINDS, QUANTITIES, Units, against, of_reference, of_steps, units_of
+from robot_dyn.simulation.diagnostics.step_remarks import (
+    KINDS,
+    QUANTITIES,
+    Units,
+    against,
+    of_reference,
+    of_steps,
+    units_of,
+)
 from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
