@@ -15,7 +15,7 @@ from robot_dyn.integrate.primitives import below
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 _FIRST = np.zeros(1, np.int64)
-Function = Callable[..., None] | int
+Function = Callable[..., object]  # in machine code its address
 """A function of (t, y, p, run_parameters, out): a Python function, the address of machine code, or 0 for none."""
 
 
@@ -23,8 +23,8 @@ class Ended(IntEnum):
     """The reason for which a time loop returned."""
 
     DONE = 0
-    PAUSED = 1  # the budget of steps is used up
-    NEEDS_REVIEW = 2  # the next step needs a check; y is the state before it
+    PAUSED = 1  # the budget of steps is used up, a stop is requested, or the log of events is full
+    NEEDS_REVIEW = 2  # the next step is doubtful, and Python repeats it; y is the state before it
     TICK = 3  # the torque of the controller is not finite
     ENERGY_GROWS = 4  # energy may grow without a source; y is the state after the step
     TOO_SMALL = 5  # no step large enough to change t in floating point is within the tolerance

@@ -28,7 +28,7 @@ class Watched(Protocol):
         """Return y with the next states of the controller, and the torque to hold; see `StateEquation.tick`."""
         ...
 
-    def answer(self, t: float, y: np.ndarray, compute: Callable[[], T]) -> T:
+    def attempt(self, t: float, y: np.ndarray, compute: Callable[[], T]) -> T:
         """Return the result of `compute`; raise the error that ends the run if the equations cannot be evaluated."""
         ...
 

@@ -92,8 +92,8 @@ def interpreted(equation: StateEquation, watch: Watched) -> Functions:
 
     def energy(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         x = _state(y)
-        q, v, _, _ = watch.answer(t, x, lambda: equation.state(x))
-        out[:, 0] = watch.answer(t, x, lambda: equation.energies(t, q, v))
+        q, v, _, _ = watch.attempt(t, x, lambda: equation.state(x))
+        out[:, 0] = watch.attempt(t, x, lambda: equation.energies(t, q, v))
 
     def sampled(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         sample(equation, *at(t, y, p, run_parameters), out[:, 0])

@@ -152,8 +152,11 @@ def snap(laws: ContactLaws, y: Array, first: int, end: int) -> None:
                 y[laws.rows[i], 0] = laws.lower[s, i] if side < 0.0 else laws.upper[s, i]
 
 
-def reaction_bounds(mode: ContactMode, y: Array) -> None:
-    """Write the bounds of the reactions at rest, least and most, into the work arrays."""
+def write_reaction_bounds(mode: ContactMode, y: Array) -> None:
+    """Write the bounds of the reactions at rest, least and most, into the work arrays.
+
+    They are those of friction; a touched stop may push without limit, away from itself.
+    """
     laws, least, most = mode.laws, mode.work.settling.least, mode.work.settling.most
     for i in range(len(laws.rows)):
         least[i], most[i] = laws.least[i], laws.most[i]

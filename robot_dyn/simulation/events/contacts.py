@@ -116,7 +116,10 @@ def contacts_of(
 
 
 def laws_of(equation: StateEquation) -> ContactLaws:
-    """Return the laws of the coordinates of a state equation that may be held."""
+    """Return the laws of the coordinates of a state equation that may be held: all joints, and gaps of backlash.
+
+    Without stops of the joints, gaps get one effect of unlimited stops, to which their ends belong.
+    """
     n, motion = equation.plant.dynamics.n, equation.equation_of_motion
     working: list[Any] = [effect for effect in equation.plant.forces if not isinstance(effect, Conservative)]
     first_work, first_state = equation.size - len(equation.sources) + 1, 2 * n + equation.state_size
@@ -125,13 +128,13 @@ def laws_of(equation: StateEquation) -> ContactLaws:
         if isinstance(effect := motion.effects[k], RigidBacklash):
             gaps.append(_gap_columns(effect, n, first_state + place.start, first_work + working.index(effect)))
     columns = [np.concatenate(column) for column in zip(*gaps, strict=True)] if gaps else [np.zeros(0)] * 9
-    joints, delta, speed, motors, impulse, work, inertia, level, e = columns
+    joints, delta, speed, motors, impulse, work, inertia, half_gap, e = columns
     others = [effect for effect in motion.set_valued if not isinstance(effect, RigidStops)]
     stops = [effect for effect in motion.set_valued if isinstance(effect, RigidStops)]
     intervals = [effect.at_rest(np.zeros(n)) for effect in others]
     least, most = (sum((interval[k] for interval in intervals), start=np.zeros(n)) for k in (0, 1))
     sliding = sum((effect.sliding(np.zeros(n)) for effect in motion.set_valued), start=np.zeros(n))
-    lower, upper, restitution = _stops(stops, n, level, e)
+    lower, upper, restitution = _stops(stops, n, half_gap, e)
     works_of_stops = [first_work + working.index(effect) for effect in stops] or [-1] * bool(gaps)
 
     def rows(of_joints: np.ndarray, of_gaps: np.ndarray) -> np.ndarray:
@@ -140,7 +143,7 @@ def laws_of(equation: StateEquation) -> ContactLaws:
     def zero_for_gaps(of_joints: np.ndarray) -> np.ndarray:
         return np.concatenate([of_joints, np.zeros(len(joints), of_joints.dtype)])
 
-    i, end = np.arange(n), 2 * n + equation.states
+    i, end = np.arange(n), 2 * n + equation.states  # the last n states are the impulses of joints
     return ContactLaws(
         n=n,
         joints=rows(i, joints),
@@ -163,13 +166,13 @@ def laws_of(equation: StateEquation) -> ContactLaws:
     )
 
 
-def _stops(stops: Sequence[RigidStops], n: int, level: np.ndarray, e: np.ndarray) -> np.ndarray:
+def _stops(stops: Sequence[RigidStops], n: int, half_gap: np.ndarray, e: np.ndarray) -> np.ndarray:
     """Return lower stops, upper stops and e of each effect, with the ends of gaps, (3, S, N), N ≥ 2."""
     effects: list[Any] = [[effect.lower, effect.upper, effect.restitution] for effect in stops]
-    effects = effects or [[-np.inf, np.inf, 0.0]] * (len(level) > 0)
+    effects = effects or [[-np.inf, np.inf, 0.0]] * (len(half_gap) > 0)
     of_joints = np.array([[np.broadcast_to(x, n) for x in row] for row in effects], float).reshape(-1, 3, n)
-    of_gaps = np.broadcast_to(np.array([-level, level, e]), (len(effects), 3, len(level)))
-    unused = np.zeros((len(effects), 3, max(0, 2 - n - len(level))))
+    of_gaps = np.broadcast_to(np.array([-half_gap, half_gap, e]), (len(effects), 3, len(half_gap)))
+    unused = np.zeros((len(effects), 3, max(0, 2 - n - len(half_gap))))
     return np.ascontiguousarray(np.concatenate([of_joints, of_gaps, unused], axis=2).swapaxes(0, 1))
 
 

@@ -70,13 +70,13 @@ class DetectingWork(NamedTuple):
 def lane_events(
     rows: Array, coordinates: int, levels: Array, rate_rows: int, functions: int, positions: int
 ) -> LaneEvents:
-    """Return the switching functions of runs at their start; see `LaneEvents`.
+    """Return the switching functions of runs, whose sides, rates and values are not yet evaluated; see `start`.
 
     Args:
         rows: Entries of y and of the functions, (K,).
         coordinates: Number of coordinates.
         levels: Levels, (K, W).
-        rate_rows: Rows of a rate.
+        rate_rows: Number of entries of a rate.
         functions: Number of functions.
         positions: Number of positions.
     """

@@ -158,8 +158,12 @@ def same_sides(table: EventTable, lanes: Lanes, t: float) -> bool:
     return True
 
 
-def correction(table: EventTable, lanes: Lanes, work: DenseWork, event: int, t: float, h: float, whole: float) -> float:
+def newton_shift(
+    table: EventTable, lanes: Lanes, work: DenseWork, event: int, t: float, h: float, whole: float
+) -> float:
     """Return Newton's correction of the length of a step that should end at the root of a switching function, in [s].
+
+    It is 0 where the slope is 0.
 
     Args:
         table: The switching functions.
@@ -177,12 +181,12 @@ def correction(table: EventTable, lanes: Lanes, work: DenseWork, event: int, t: 
         evaluate_within(table, lanes, work.F, t, whole, theta - NEAR)
         slope = (slope - distance(table, event)) / (2 * NEAR * whole)
         evaluate(table.functions, t + h, lanes.after, lanes.p, lanes.run_parameters, table.values)
-        left = distance(table, event)
+        residual = distance(table, event)
     elif table.is_rate[event]:
         b = table.coefficients
         rate_coefficients(work.F, row, whole, b)
         slope = (value(b[:-1], theta + NEAR) - value(b[:-1], theta - NEAR)) / (2 * NEAR * whole)
-        left = work.last[row, 0] - level
+        residual = work.last[row, 0] - level
     else:
-        left, slope = lanes.after[row, 0] - level, work.last[row, 0]
-    return -left / slope if slope != 0.0 else 0.0
+        residual, slope = lanes.after[row, 0] - level, work.last[row, 0]
+    return -residual / slope if slope != 0.0 else 0.0

@@ -105,14 +105,18 @@ def root_of_function(table: EventTable, lanes: Lanes, F: Array, t: float, h: flo
 
 
 def bracket(table: EventTable, lanes: Lanes, F: Array, t: float, h: float, e: int) -> tuple[float, float]:
-    """Return two θ between which a function changes sign first; the second is `NONE` if it does not."""
-    x, is_user_defined = table.scanned[e - coordinates(table)], e >= len(table.rows) - table.user_defined
+    """Return two θ between which a function changes sign first; the second is `NONE` if it does not.
+
+    `table.scanned` has its distances at all scans. Signs are compared at eighths of the step; scans next to the ends
+    only show a minimum of a user-defined function, which `dip` searches for a negative value.
+    """
+    scanned, is_user_defined = table.scanned[e - coordinates(table)], e >= len(table.rows) - table.user_defined
     low = 0.0
     for i in range(1, SCANS):
         is_eighth = i != 1 and i != SCANS - 2
-        if is_eighth and x[i] < 0.0:
+        if is_eighth and scanned[i] < 0.0:
             return low, scan(i)
-        if is_user_defined and i < SCANS - 1 and x[i - 1] > x[i] > 0.0 and x[i + 1] >= x[i]:
+        if is_user_defined and i < SCANS - 1 and scanned[i - 1] > scanned[i] > 0.0 and scanned[i + 1] >= scanned[i]:
             high = dip(table, lanes, F, t, h, e, i)
             if high < NONE:
                 return scan(i - 1), high

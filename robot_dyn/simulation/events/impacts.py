@@ -19,9 +19,9 @@ from robot_dyn.simulation.events.contact_mode import (
     ContactLaws,
     ContactMode,
     apply_velocities,
-    reaction_bounds,
     touched,
     write_bodies,
+    write_reaction_bounds,
 )
 from robot_dyn.simulation.events.event_log import EventKind, log_event
 
@@ -100,13 +100,16 @@ def impact(mode: ContactMode, v: Array, s: int, after: Array) -> bool:
 
 
 def write_problem(problem: Settling, v: Array, side: Array, e: Array, rest_time: Array) -> None:
-    """Write the bounds of v⁺ − v of an impact."""
+    """Write the bounds of v⁺ − v of an impact, to which friction and other finite forces do not contribute.
+
+    v⁺ = 0 for joints that come to rest. At a touched stop, |v⁺| ≥ e |v| away from it, unless the joint already leaves.
+    """
     for i in range(len(v)):
-        rests, meets = rest_time[i] < np.inf, side[i] * v[i] >= 0.0
+        rests, approaches = rest_time[i] < np.inf, side[i] * v[i] >= 0.0
         bound = -v[i] if rests else -(1.0 + e[i]) * v[i]
         problem.p[i], problem.f[i] = 0.0, 0.0
-        problem.lower[i] = bound if rests or (side[i] < 0.0 and meets) else -np.inf
-        problem.upper[i] = bound if rests or (side[i] > 0.0 and meets) else np.inf
+        problem.lower[i] = bound if rests or (side[i] < 0.0 and approaches) else -np.inf
+        problem.upper[i] = bound if rests or (side[i] > 0.0 and approaches) else np.inf
 
 
 def come_to_rest(f: Functions, t: float, y: Array, p: Array, mode: ContactMode, s: int) -> bool:
@@ -125,7 +128,7 @@ def come_to_rest(f: Functions, t: float, y: Array, p: Array, mode: ContactMode, 
     while True:  # each joint once, because those at rest do not return
         apply_velocities(laws, work.y, work.v_rest)
         write_bodies(f, t, work.y, p, mode)
-        reaction_bounds(mode, work.y)
+        write_reaction_bounds(mode, work.y)
         for i in range(len(work.v)):
             work.settling.forced[i] = 0.0
         if not settle(work.M_all, work.load, laws.sliding, work.v_rest, work.held, work.direction, work.settling):

@@ -24,11 +24,11 @@ from robot_dyn.simulation.events.contact_mode import (
     ContactLaws,
     ContactMode,
     move_motors,
-    reaction_bounds,
     snap,
     touched,
     write_bodies,
     write_mode,
+    write_reaction_bounds,
 )
 from robot_dyn.simulation.events.event_log import EventKind, log_event
 from robot_dyn.simulation.events.event_table import ROUNDING, EventTable, same_sides
@@ -102,7 +102,7 @@ def change_mode(f: Functions, t: float, lanes: Lanes, mode: ContactMode, guard: 
     if forced != 0.0 and y[laws.speeds[i], 0] == 0.0:  # an impact may have thrown it back
         settling.forced[i] = forced
     write_bodies(f, t, y, lanes.p, mode)
-    reaction_bounds(mode, y)
+    write_reaction_bounds(mode, y)
     for k in range(len(laws.rows)):
         work.v[k] = y[laws.speeds[k], 0]
     if not settle(work.M_all, work.load, laws.sliding, work.v, mode.held, mode.direction, settling):
@@ -178,11 +178,12 @@ def accumulates(mode: ContactMode, t: float) -> bool:
 def write_guards(mode: ContactMode, y: Array, table: EventTable) -> None:
     """Write the guards of the mode at a state into the table."""
     laws, bounds, e = mode.laws, mode.work.settling, table.thresholds
-    reaction_bounds(mode, y)
+    write_reaction_bounds(mode, y)
     for i in range(len(laws.rows)):
         x, v, held = y[laws.rows[i], 0], y[laws.speeds[i], 0], mode.held[i] != 0.0
         write_guard(table, e, held, bounds.least[i], 1.0)
         write_guard(table, e + 1, held, bounds.most[i], -1.0)
+        # without friction, a joint has this guard only while it leaves a stop: until it turns
         slides = not held and mode.direction[i] != 0.0 and (laws.has_friction[i] or v == 0.0)
         write_guard(table, e + REACTIONS, slides, 0.0, mode.direction[i])
         e += REACTIONS + 1
@@ -190,7 +191,7 @@ def write_guards(mode: ContactMode, y: Array, table: EventTable) -> None:
             is_free = not held and (s == 0 or i < laws.n)  # each effect has the ends of gaps
             for side in range(2):
                 level = laws.lower[s, i] if side == 0 else laws.upper[s, i]
-                leaves = x == level and v == 0.0  # then the guard of its velocity is active until it turns
+                leaves = x == level and v == 0.0  # then the guard of its velocity is active instead
                 write_guard(table, e, is_free and not leaves, level, 1.0 if side == 0 else -1.0)
                 e += 1
 
@@ -206,7 +207,7 @@ def write_guard(table: EventTable, e: int, active: bool, level: float, side: flo
 def start_mode(mode: ContactMode, y: Array) -> None:
     """Write the mode at the start: all coordinates that may be held are, until the reactions are computed."""
     laws, work = mode.laws, mode.work
-    reaction_bounds(mode, y)
+    write_reaction_bounds(mode, y)
     for i in range(len(laws.rows)):
         v, can_hold = y[laws.speeds[i], 0], work.settling.least[i] < 0.0 or work.settling.most[i] > 0.0
         mode.held[i] = 1.0 if v == 0.0 and can_hold else 0.0

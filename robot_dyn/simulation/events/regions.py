@@ -38,11 +38,13 @@ class Regions(NamedTuple):
     log: EventLog
 
 
-def regions_of(thresholds: int, parameters: int, directions: Array, terminal: Array, log: EventLog) -> Regions:
+def empty_regions(
+    threshold_count: int, parameter_count: int, directions: Array, terminal: Array, log: EventLog
+) -> Regions:
     """Return a table without regions."""
     return Regions(
-        sides=np.zeros((thresholds, _MOST)),
-        run_parameters=np.zeros((parameters, _MOST)),
+        sides=np.zeros((threshold_count, _MOST)),
+        run_parameters=np.zeros((parameter_count, _MOST)),
         filled=np.zeros(1, np.int64),
         directions=directions,
         terminal=terminal,
@@ -50,10 +52,13 @@ def regions_of(thresholds: int, parameters: int, directions: Array, terminal: Ar
     )
 
 
-def pass_threshold(
+def pass_level(
     regions: Regions, table: EventTable, mode: ContactMode, lanes: Lanes, held: int, event: int, t: float
 ) -> bool:
-    """Handle the event of a threshold, or of a user. Return False if Python must take over.
+    """Handle a threshold or user-defined event in the loop. Return False if Python must take over.
+
+    Python takes over for a terminal event, a new region, thresholds that may chatter, and a full log. A user-defined
+    event in the other direction is ignored.
 
     Args:
         regions: The regions.
@@ -70,10 +75,10 @@ def pass_threshold(
         return False
     g = number - len(regions.sides)  # among the user-defined events
     if g >= 0:
-        counts = regions.directions[g] * side >= 0.0
-        if regions.terminal[g] and counts:
+        is_wanted = regions.directions[g] * side >= 0.0
+        if regions.terminal[g] and is_wanted:
             return False
-        if not counts:
+        if not is_wanted:
             return True
     elif may_chatter(log, t) or not enter_region(regions, table, mode, lanes, held):
         return False

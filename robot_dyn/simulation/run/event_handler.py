@@ -22,7 +22,7 @@ from robot_dyn.simulation.events.contacts import NO_CONTACT, Contacts, contacts_
 from robot_dyn.simulation.events.event_log import CHATTER, EventKind, event_log, log_time
 from robot_dyn.simulation.events.event_table import EventTable
 from robot_dyn.simulation.events.mode_change import change_mode
-from robot_dyn.simulation.events.regions import add_region, regions_of
+from robot_dyn.simulation.events.regions import add_region, empty_regions
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.run.event_loop import Events
 from robot_dyn.simulation.run.outcome import Accumulation, Outcome, Reason
@@ -101,7 +101,17 @@ class EventHandler:
         return event.name if event.terminal else None
 
     def after_mode(self, ended: Ended, t: float, y: np.ndarray) -> Accumulation | None:
-        """Continue after the end of a mode; return `Accumulation` if the run gives up. DivergedError ends the run."""
+        """Handle the end of a contact mode that the loop leaves to Python; DivergedError ends the run.
+
+        Args:
+            ended: UNSETTLED if no mode is found: the run ends. ACCUMULATED: the run gives up or ends. CHANGED if the
+                side of a threshold has changed with the mode: the table and the equation are renewed.
+            t: Time, in [s].
+            y: State, (m,).
+
+        Returns:
+            `Accumulation` if the run gives up; None if it continues.
+        """
         contacts = self.switching.contacts
         assert contacts is not None
         if ended is Ended.UNSETTLED:
@@ -139,7 +149,7 @@ class EventHandler:
             log_time(self.log, event.t)
 
     def _occurrence(self, row: list[float]) -> Occurrence:
-        """Return the event of a row of the log."""
+        """Return the event of a row of the log, whose state has q and v only."""
         if self.switching.contacts is not None and row[2] != EventKind.PASSES:
             return self.switching.contacts.occurrence(row)
         t, number, _, side, _, *values = row
@@ -169,7 +179,7 @@ class EventHandler:
         state, rules = self.state, [(event.direction, event.terminal) for event in self.state.setup.events]
         directions, terminal = np.array(rules, float).reshape(-1, 2).T
         count, parameters = len(self.switching.thresholds), len(state.lanes.run_parameters) - state.config.held
-        self.regions = regions_of(count, parameters, directions.copy(), terminal > 0, self.log)
+        self.regions = empty_regions(count, parameters, directions.copy(), terminal > 0, self.log)
 
     def _lenient(self, functions: Functions) -> Functions:
         """Return Python functions whose rate is nan if it overflows, so that error control tries a shorter step."""

@@ -33,15 +33,15 @@ from robot_dyn.simulation.events.event_table import (
     EventTable,
     coordinate_approaches,
     coordinates,
-    correction,
     function_approaches,
+    newton_shift,
     settle_sides,
     start_table,
 )
 from robot_dyn.simulation.events.first_event import first_event
-from robot_dyn.simulation.events.regions import Regions, pass_threshold
+from robot_dyn.simulation.events.regions import Regions, pass_level
 from robot_dyn.simulation.run.recording import Loop, log_step, observe_step, sample, share
-from robot_dyn.simulation.run.time_loop import act, changes_torque, conserves_energy, count_step
+from robot_dyn.simulation.run.time_loop import apply_tick, changes_torque, conserves_energy, count_step
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # repetitions of a step for an event
@@ -101,9 +101,8 @@ def event_loop(
                         reject(loop, events.table, control, h, e)
                         continue
                     control.end[0] = position.time[0] + (h + rest)
-                    control.next_h[0] = max(
-                        control.next_h[0], abs(control.h[0])
-                    )  # the event, not the error, shortened the step
+                    # the event, not the error, shortened the step
+                    control.next_h[0] = max(control.next_h[0], abs(control.h[0]))
                     events.table.sides[event] = -events.table.sides[event]
                 record_step(f, c, work, loop, control, h, end, has_dense and event < 0)
                 finish_step(f, work, loop, events.table, control, event, rest)
@@ -176,7 +175,7 @@ def event_loop(
             if controls_error(control):
                 e = error(c, work, h, lanes, control.rtol, control.atol)
             position.evaluations[0] += rate_at_end(f, c, work, t, h, lanes)
-            shift = correction(table, lanes, work, event, t, h, whole)
+            shift = newton_shift(table, lanes, work, event, t, h, whole)
             if not abs(shift) > _SHORT * h:
                 return h, shift, e
             if k == _ROOTS - 1 or (abs(shift) > h and event >= coordinates(table)):
@@ -215,7 +214,7 @@ def event_loop(
             control.next_h[0] = 0.0
         if 0 <= guard < table.guards:
             return end_mode(f, t, lanes, table, events.mode, guard)
-        if pass_threshold(events.regions, table, events.mode, lanes, loop.config.held, event, t):
+        if pass_level(events.regions, table, events.mode, lanes, loop.config.held, event, t):
             return Ended.DONE
         return Ended.EVENT
 
@@ -223,11 +222,11 @@ def event_loop(
 
 
 def begin_segment(f: Functions, loop: Loop) -> bool:
-    """Do the tick and the samples at the start of a segment. Return False if the torque at the tick is not finite."""
+    """Apply the tick at the start of a segment, and store the samples due. Return False if the torque is not finite."""
     table, lanes, config, position = loop.table, loop.lanes, loop.config, loop.position
     s: int = position.segment[0]
     t, period, share_period = table.starts[s], config.sample_period, config.share_period
-    if table.ticks[s] > 0 and not act(f, loop, t, table.at_ticks[s], table.ticks[s]):
+    if table.ticks[s] > 0 and not apply_tick(f, loop, t, table.at_ticks[s], table.ticks[s]):
         return False
     is_end = t == config.duration and period < np.inf
     if position.sample[0] * period <= t + _EARLY * period or config.samples_nodes or is_end:

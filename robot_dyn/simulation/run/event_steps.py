@@ -7,7 +7,7 @@ the right-hand side is smooth within a step.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, ClassVar, cast, final
+from typing import Any, ClassVar, NoReturn, cast, final
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class EventSteps:
         self.state, self.samples, self.max_evaluations = state, samples, max_evaluations
         self.past_horizon = inf  # time of the first terminal event that a companion passed, in [s]
         self._next_look = FIRST_LOOK if may_replace else 0  # number of steps at which stiffness is checked; 0 for never
-        self.stepper, self.control = _method(setup, state.equation, mesh)
+        self.stepper, self.control = _stepper(setup, state.equation, mesh)
         config = cached(setup, event_config if samples else companion_config)
         shared = 0 if config.share_period == inf else _COMPARED + len(state.table.counts) + 2
         state.allocate(config, int(most_samples(setup)) + 2 if samples else 0, shared, _CHUNK)
@@ -90,7 +90,7 @@ class EventSteps:
         room = len(self.state.records.step_log_t) - int(self.state.position.step_row[0]) or budget
         return min(room, self._next_look - int(self.state.position.steps[0])) if self._next_look else room
 
-    def replaced(self) -> Stiff | None:
+    def detect_stiffness(self) -> Stiff | None:
         """Return `Stiff` if a stiff method should replace the run, else None."""
         state = self.state
         if not self._next_look or state.position.steps[0] < self._next_look:
@@ -128,7 +128,7 @@ class EventSteps:
             raise DivergedError(Outcome(Reason.STATE_OVERFLOWS, t, facts={"largest": inf}))
         if t > self.past_horizon + state.setup.duration_s / _COMPARED:
             return Outcome(Reason.END, self.past_horizon)
-        state.watch.pace(t, y, int(state.position.steps[0]))
+        state.watch.check_pace(t, y, int(state.position.steps[0]))
         if ended is Ended.EVENT:
             return self._event(t, y)
         if ended in (Ended.CHANGED, Ended.ACCUMULATED, Ended.UNSETTLED):
@@ -138,7 +138,7 @@ class EventSteps:
         elif ended is Ended.TICK:
             state.tick()
         elif ended is Ended.ENERGY_GROWS:
-            state.watch.look(t, y)
+            state.watch.check_energy(t, y)
         elif ended is Ended.TOO_SMALL and not state.setup.method.controls_error:
             self._review_step()
         elif ended is not Ended.PAUSED:
@@ -172,7 +172,7 @@ class EventSteps:
         """The state equation on the current sides of the switching functions."""
         return self.handler.switching.on(self.handler.event_table.sides)
 
-    def _review_step(self) -> None:
+    def _review_step(self) -> NoReturn:
         """Repeat a failed step of a method of fixed step by the interpreted equation; DivergedError has the reason."""
         state, t, y, equation = self.state, self.time, self.state.y, self._equation
         p, functions = state.table.parameters[state.segment], interpreted(equation, state.watch)
@@ -190,7 +190,10 @@ class EventSteps:
             self.state.loop = self.state.loop._replace(records=records._replace(step_log_t=t, step_log=y))
 
     def paths(self) -> tuple[Path, Path, np.ndarray]:
-        """Return the states shared with companions, those at the ends of steps, and the times of all ends."""
+        """Return the states shared with companions; those at the ends of steps; and the times of all ends of steps.
+
+        The second has at most about `MOST_SHARED` states, the first ones.
+        """
         records, setup, position = self.state.records, self.state.setup, self.state.position
         shared, steps = int(position.shared_row[0]), int(position.step_row[0])
         ends = records.step_log_t[:steps]
@@ -208,31 +211,31 @@ def _on(times: np.ndarray, path: Path) -> Path:
     return Path(key[rows], path.t[rows], path.y[rows])
 
 
-def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> tuple[ControlledStepper, StepControl]:
+def _stepper(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> tuple[ControlledStepper, StepControl]:
     """Return the stepper of the method, and the control of its steps before the first."""
     method: Any = setup.method
     n, m, ends = equation.plant.dynamics.n, equation.size, np.zeros(0) if mesh is None else mesh
     if not method.controls_error:
         stepper = hermite.stepper(method, m, n, m + n, equation.widths)
         return stepper, initial_control(stepper.error_order, mesh=ends)
-    bounded = m - len(equation.sources)
-    stepper = STEPPERS[method.method](m, m + n, bounded)
-    constant = equation.state_size if equation.sampled else 0  # between ticks: left out of the mean of squares
-    part = np.sqrt(1 - constant / bounded)
+    controlled = m - len(equation.sources)  # entries of y whose error is controlled: all but the works
+    stepper = STEPPERS[method.method](m, m + n, controlled)
+    constant = equation.state_size if equation.sampled else 0  # between ticks, so that their error is 0
+    part = np.sqrt(1 - constant / controlled)  # the tolerances are for the mean of squares over the other entries
     longest = min(method.max_step_s, setup.longest_step_s)
     return stepper, initial_control(stepper.error_order, part * method.rtol, part * method.atol, longest, ends)
 
 
 def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
-    """Return the settings of the loop, with the times of samples and of shared states."""
-    controls_error, every = setup.method.controls_error, not setup.record_every_s
+    """Return the settings of the loop, with the periods of samples and of states shared with companions."""
+    controls_error, at_nodes = setup.method.controls_error, not setup.record_every_s
     period = setup.record_every_s or (setup.duration_s / _SAMPLES if controls_error else inf)
     share_period = setup.duration_s / _COMPARED if controls_error and setup.estimate_error else inf
     return loop_config(setup.equation, alone=True)._replace(
         sample_period=float(period) if samples else inf,
         share_period=float(share_period),
-        samples_nodes=samples and every,
-        samples_steps=samples and every and not controls_error,
+        samples_nodes=samples and at_nodes,
+        samples_steps=samples and at_nodes and not controls_error,
         duration=float(setup.duration_s),
         restarts=setup.method.needs_jacobian,
     )

@@ -71,7 +71,7 @@ class FixedSteps:
         """Return the number of steps before the loop must return: `budget`, because the records have enough rows."""
         return budget
 
-    def replaced(self) -> None:
+    def detect_stiffness(self) -> None:
         """Return None: a run of fixed steps is not replaced by one of another method."""
 
     def advance(self) -> Ended:
@@ -85,7 +85,10 @@ class FixedSteps:
             return Ended.NEEDS_REVIEW
 
     def judge(self, ended: Ended) -> None:
-        """Repeat a doubtful step, tick or energy check by the interpreted equation; DivergedError ends the run."""
+        """Handle what the loop returned for: change payloads, or repeat a doubtful step, tick or energy check.
+
+        The interpreted equation repeats them, and DivergedError ends the run.
+        """
         state = self.state
         if ended is Ended.TICK:
             state.tick()
@@ -94,7 +97,7 @@ class FixedSteps:
         elif ended is Ended.NEEDS_REVIEW:
             self._step()
         elif ended is not Ended.PAUSED:
-            state.watch.look(self.time, state.y)
+            state.watch.check_energy(self.time, state.y)
 
     def _step(self) -> None:
         """Take one step by the interpreted equation."""
@@ -114,13 +117,13 @@ class FixedSteps:
         position.step[0] += 1
         position.steps[0] += 1
         if position.steps[0] % WATCHED == 0:
-            state.watch.look(t + h, y)
+            state.watch.check_energy(t + h, y)
 
     def _jump(self, functions: Functions, t: float, h: float, p: np.ndarray) -> np.ndarray:
         """Return the state after a step in which velocities may jump."""
         (step, coefficients, work), lanes, watch = self.stepper, self.state.lanes, self.state.watch
         lanes.p[:] = p
-        watch.answer(t, self.state.y, lambda: step(functions, coefficients, work, t, h, lanes))
+        watch.attempt(t, self.state.y, lambda: step(functions, coefficients, work, t, h, lanes))
         if lanes.failed[0] or overflowed(lanes.after):
             raise watch.diverged(Reason.STATE_OVERFLOWS, t, self.state.y)
         return lanes.after[:, 0].copy()

@@ -1,6 +1,7 @@
 """Outcomes of runs: reason, time and the numbers that explain it; and the one place that words them.
 
 To answer "why did this run end?": find the reason below, then search for `Reason.<NAME>` to see where it is raised.
+Time loops return a number, `Ended` or `LaneEnd` in dynamics/loop_state.py; search for it to see the condition.
 `explained` in diagnostics/unstable_loop.py and `judged` in diagnostics/runaway.py may replace it afterwards.
 """
 
@@ -51,7 +52,7 @@ class Reason(StrEnum):
     IMPLAUSIBLE_SPEED = "implausible_speed"
     """A joint moved faster than 100 times its velocity limit (100 rad/s if the file states none), or 1e6 rad/s.
 
-    A run by fixed steps ends here only if its energy ledger does not close. Check gains, period and step.
+    A run by fixed steps ends here only if its energy ledger does not close. Check gains, period, step and effects.
     """
 
     ENERGY_WITHOUT_SOURCE = "energy_without_source"
@@ -63,7 +64,7 @@ class Reason(StrEnum):
     STATE_OVERFLOWS = "state_overflows"
     """A number of the state became infinite, nan or larger than 1e100.
 
-    The step is too long, the loop is unstable, or the inertia of a joint is close to zero.
+    The step is too long, the loop is unstable, an effect feeds in energy, or the inertia of a joint is close to zero.
     """
 
     RATE_NOT_FINITE = "rate_not_finite"
@@ -160,7 +161,7 @@ _SENTENCES: Mapping[Reason, Parts] = {
     Reason.CONTROL_LOOP_UNSTABLE: line_parts(RemarkKind.UNSTABLE),
     Reason.STEP_TOO_LONG: line_parts(RemarkKind.TOO_LONG),
     Reason.IMPLAUSIBLE_SPEED: (
-        (*TOO_FAST, "a joint moves faster than {limit:g} rad/s: the control is unstable"),
+        (*TOO_FAST, "a joint moves faster than {limit:g} rad/s or m/s: check gains and effects"),
         ", and the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
     ),
     Reason.ENERGY_WITHOUT_SOURCE: ("energy grows without a source", _FASTEST, _PERIOD),

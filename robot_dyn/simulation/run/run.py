@@ -142,11 +142,14 @@ class Run:
         return Outcome(Reason.END, self.state.setup.duration_s)
 
     def _advance(self, budget: int) -> Ended | Stiff:
-        """Take `budget` steps, and empty the observer or enlarge the records when they are full."""
+        """Take `budget` steps, and empty the observer or enlarge the records when they are full.
+
+        Return why the last call of the loop ended; or `Stiff` if a stiff method should replace the run.
+        """
         observer, position = self.state.observer, self.state.position
         while True:
-            if (replaced := self.steps.replaced()) is not None:
-                return replaced
+            if (stiff := self.steps.detect_stiffness()) is not None:
+                return stiff
             steps = min(budget, self.steps.room(budget))
             if observer is None:
                 position.budget[0] = steps
@@ -156,7 +159,7 @@ class Run:
                 position.column[0] = observer.filled
                 ended = self.steps.advance()
                 observer.filled = int(position.column[0])
-                observer.look()
+                observer.process()
             budget -= steps
             if ended is not Ended.PAUSED or budget <= 0:
                 return ended

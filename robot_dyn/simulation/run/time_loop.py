@@ -27,7 +27,9 @@ RUNAWAY = 1e3  # times the energy at the start and the work: a larger gain of en
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
     """Return the time loop of a step function; see `Stepper`.
 
-    advance(functions, coefficients, work, loop, stop) → Ended; `stop[0]` other than 0 ends it after its current step.
+    advance(functions, coefficients, work, loop, stop) → Ended. It returns early where Python must act, or after the
+    current step if `stop[0]` is not 0; the next call continues at `loop.position`. The last segment is the end of the
+    run: its state is recorded, and no step is taken.
     """
 
     def advance(functions: Functions, coefficients: Any, work: Any, loop: Loop, stop: Array) -> int:
@@ -41,7 +43,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD
             copy(lanes.p, table.parameters[s])
-            if position.step[0] == 0 and tick > 0 and not act(functions, loop, start, table.at_ticks[s], tick):
+            if position.step[0] == 0 and tick > 0 and not apply_tick(functions, loop, start, table.at_ticks[s], tick):
                 return Ended.TICK
             while position.step[0] < table.counts[s]:
                 acted = position.step[0] == 0 and changes_torque(config, tick)
@@ -79,14 +81,16 @@ def begin_lanes(functions: Functions, loop: Loop) -> None:
         observe_torque(functions, loop, 0.0, False)
 
 
-def act(functions: Functions, loop: Loop, t: float, p: Array, number: int) -> bool:
+def apply_tick(functions: Functions, loop: Loop, t: float, p: Array, number: int) -> bool:
     """Apply a tick: write the torque for the zero-order hold and the next states of the controller.
+
+    Noise is drawn by the number of the period: all ticks of a period get the same.
 
     Args:
         functions: Functions of the state equation.
         loop: The loop.
         t: Time of the tick, in [s].
-        p: Numbers of the segment at that time alone.
+        p: Numbers of the segment for evaluations at the time of the tick.
         number: Number of the tick, from 1.
 
     Returns:
@@ -127,9 +131,9 @@ def record(functions: Functions, loop: Loop, t: float, at_end: bool) -> None:
 
 
 def accept(lanes: Lanes, config: LoopConfig, t: float) -> bool:
-    """Replace y by y⁺. Return False, without that, if y⁺ of a single run is doubtful.
+    """Replace y by y⁺ unless y⁺ is doubtful: too large, not finite, or of a step whose stages were not found.
 
-    In lock step, runs end if their y⁺ is too large or not finite, or if the stages of the step were not found.
+    Return False for a doubtful step of a single run; y is then unchanged. In lock step, the runs concerned end at t.
     """
     sizes(lanes.after, lanes.size)
     doubtful = not (below(lanes.size, config.largest) and below(lanes.failed, 1))

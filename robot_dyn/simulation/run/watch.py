@@ -15,6 +15,7 @@ from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.run.outcome import Outcome, Reason
+from robot_dyn.simulation.run.time_loop import RUNAWAY
 from robot_dyn.simulation.setup.setup import Setup
 
 LARGEST = 1e100  # limit on Σ |y|; products of larger numbers overflow
@@ -35,7 +36,7 @@ class DivergedError(PortableError):
 
 def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
     """Return the state after a step; raises DivergedError if the step fails or a number overflows."""
-    after = watch.answer(t, y, lambda: method.step(system, t, y, h))
+    after = watch.attempt(t, y, lambda: method.step(system, t, y, h))
     if overflowed(after):
         raise watch.diverged(Reason.STATE_OVERFLOWS, t, y)
     return after
@@ -65,22 +66,25 @@ class Watch:
         self.setup, self.equation = setup, equation
         K, V = cached(setup, start_energies)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
-        self.paced_t, self.paced_steps = 0.0, 0  # time and steps at the last check of the pace
+        self.pace_t, self.pace_steps = 0.0, 0  # time and steps at the last check of the pace
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
         """Run one controller tick; raises DivergedError if the tick fails or the torque is not finite."""
-        y, held = self.answer(t, y, lambda: self.equation.tick(t, y))
+        y, held = self.attempt(t, y, lambda: self.equation.tick(t, y))
         if held is not None and not np.isfinite(held).all():
             raise self.diverged(Reason.TORQUE_NOT_FINITE, t, y)
         return y, held
 
-    def look(self, t: float, y: Array) -> None:
+    def check_energy(self, t: float, y: Array) -> None:
         """Raise DivergedError if energy grows without a source."""
-        if self.answer(t, y, lambda: self.energy_grows(t, y)):
+        if self.attempt(t, y, lambda: self.energy_grows(t, y)):
             raise self.diverged(Reason.ENERGY_WITHOUT_SOURCE, t, y)
 
-    def answer(self, t: float, y: Array, compute: Callable[[], T]) -> T:
-        """Return the result of `compute`; raises DivergedError if the equations cannot be evaluated."""
+    def attempt(self, t: float, y: Array, compute: Callable[[], T]) -> T:
+        """Return the result of `compute`; raises DivergedError if the equations cannot be evaluated at t and y.
+
+        Mistakes in user-written code are raised unchanged, see `is_mistake`.
+        """
         try:
             return compute()
         except IntegrationError as error:  # the message already suggests a remedy
@@ -91,18 +95,18 @@ class Watch:
                 raise
             raise self.diverged(Reason.CANNOT_EVALUATE, t, y, error=str(error)) from None
 
-    def pace(self, t: float, y: Array, steps: int) -> None:
+    def check_pace(self, t: float, y: Array, steps: int) -> None:
         """Raise DivergedError if the steps of an adaptive method are too short for the run to finish."""
-        since = steps - self.paced_steps
-        if since < _PACED:
+        taken = steps - self.pace_steps
+        if taken < _PACED:
             return
-        advanced, self.paced_t, self.paced_steps = t - self.paced_t, t, steps
-        remaining = (self.setup.duration_s - t) / max(advanced, 1e-300) * since
+        advanced, self.pace_t, self.pace_steps = t - self.pace_t, t, steps
+        remaining = (self.setup.duration_s - t) / max(advanced, 1e-300) * taken
         if remaining > _MOST_AHEAD:
             implicit = "" if self.setup.method.name == "Rodas5P" else "Rodas5P, "
-            facts: dict[str, float | str] = {"steps": since, "advanced_s": advanced, "remaining": remaining}
+            facts: dict[str, float | str] = {"steps": taken, "advanced_s": advanced, "remaining": remaining}
             facts["remedy"] = f"{implicit}softer effects or a larger tolerance"
-            motion = self._fastest(t, y, advanced / since)
+            motion = self._fastest(t, y, advanced / taken)
             facts |= motion.facts if motion else {}
             joint = motion.joint if motion else ""
             raise DivergedError(Outcome(Reason.STALLED, t, joint, facts | self._steepest()))
@@ -132,7 +136,7 @@ class Watch:
         """Return True if the ledger's residual shows energy growth without a source."""
         q, v, _, W = self.equation.state(y)
         K, V = self.equation.energies(np.array([t]), q[None], v[None])
-        return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
+        return bool((K + V)[0] - self.energy - W.sum() > RUNAWAY * (self.scale + np.abs(W).sum()))
 
     def diverged(self, reason: Reason, t: float, y: Array, **facts: str) -> DivergedError:
         """Return the error for a run that diverged at time t and state y, with its fastest joint."""
