@@ -12,17 +12,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from math import inf
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import check_coefficients, declared
 from robot_dyn.foundations.errors import EffectError, QueryError
 from robot_dyn.foundations.threshold import Layer, Threshold, smooth
 from robot_dyn.foundations.validate import rows
 from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class _ClassName:
@@ -35,7 +38,8 @@ class _ClassName:
 class Effect(Value):
     """Anything that acts on the joints: a `Force`, a `Bound`, or a combination of these, its `parts`.
 
-    Subclass one of the four kinds below. Its methods are pure functions, called with
+    Subclass `Conservative`, `Dissipative`, `Active` or `Bound`; an effect with states also derives from `Stateful` or
+    `Drive`. Methods are pure functions, called with
 
         dynamics: the rigid bodies of the plant, a `Dynamics`
         t: time, a number, in [s]
@@ -59,7 +63,7 @@ class Effect(Value):
     def __post_init__(self) -> None:
         check_coefficients(self, EffectError, resolved=True)
 
-    def on(self, dynamics: Any) -> Effect:
+    def on(self, dynamics: Dynamics) -> Effect:
         """Return this effect with coefficients given by joint name or as "urdf" replaced by arrays (n,).
 
         Raises:
@@ -97,7 +101,7 @@ class Effect(Value):
         return self
 
     @property
-    def widths(self) -> tuple[Any, Any]:
+    def widths(self) -> tuple[Scalar, Scalar]:
         """Changes in q and in v over which the torque bends, each a scalar or (n,); inf where it is smooth.
 
         Implicit methods compute the Jacobian from differences within these changes. The change in v is also the width
@@ -214,7 +218,8 @@ class Drive(Stateful, Force, ABC):
     def driven(self, n: int) -> Sequence[int]:
         """Return the indices of the joints whose actuation the motors receive, on an arm with n joints."""
 
-    coupled: ClassVar[bool] = False  # True if motors may move with their joints; state_rate then also takes a
+    coupled: ClassVar[bool] = False
+    """True if motors may move with their joints; `state_rate` then also takes the acceleration a, (n,)."""
 
     @abstractmethod
     def speeds(self, z: Array) -> Array:
@@ -229,7 +234,15 @@ class Drive(Stateful, Force, ABC):
         return np.zeros(len(self.driven(n)))
 
     def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
-        """Return the power at one state from v, u, the torque and states of the drive, and the acceleration."""
+        """Return the power of the torque on the joints minus that of the actuation on the motors, at one state.
+
+        Args:
+            v: Velocity, (n,).
+            u: Actuation, (n,).
+            torque: Torque of the drive on the joints, (n,).
+            z: States of the drive.
+            a: Acceleration, (n,).
+        """
         return torque @ v - u[list(self.driven(len(v)))] @ self.speeds(z)
 
 
@@ -268,16 +281,16 @@ class Timed(Effect):
     def switches(self) -> tuple[float, ...]:
         return self.start_s, self.end_s
 
-    def acts(self, t: Any) -> Array:
+    def acts(self, t: ArrayLike) -> Array:
         """Return True at times t, (...,), at which the effect acts, including `start_s` but not `end_s`."""
         t = rows("t", t)
         return (self.start_s <= t) & (t < self.end_s)
 
 
-def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
+def require(message: str, relation: Callable[..., ArrayLike], *values: object) -> None:
     """Raise an EffectError unless coefficients satisfy a relation for every joint.
 
-    Values by joint name or "urdf", and mismatched numbers of joints, are checked once a plant knows the joints.
+    Values by joint name or "urdf", and mismatched numbers of joints, are checked later, when a plant is built.
     """
     if not all(isinstance(x, float | np.ndarray) for x in values):
         return
@@ -289,7 +302,7 @@ def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
         raise EffectError(f"{message}, got {' and '.join(map(str, values))}")
 
 
-def check_frame(effect: Effect, dynamics: Any, frame: str) -> None:
+def check_frame(effect: Effect, dynamics: Dynamics, frame: str) -> None:
     """Raise an EffectError if the arm has no such frame."""
     try:
         dynamics.placement(np.zeros(dynamics.n), frame)
