@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control.levenberg_marquardt import Descent, descend, held
 from robot_dyn.control.orientation import rotation_vector
@@ -102,7 +103,7 @@ def inverse_kinematics(
     pose: Any,
     *,
     frame: str,
-    q0: Any = None,
+    q0: ArrayLike | None = None,
     seed: int = 0,
     starts: int = 20,
     tolerance: float = 1e-9,
@@ -216,7 +217,7 @@ def _limits(arm: Robot, q: np.ndarray, blocked: np.ndarray) -> tuple[str, ...]:
     )
 
 
-def _start(arm: Robot, q0: Any) -> np.ndarray:
+def _start(arm: Robot, q0: ArrayLike | None) -> np.ndarray:
     """Return the first start; raise a PlanError if it is outside the limits."""
     if q0 is None:
         both = np.isfinite(arm.lower) & np.isfinite(arm.upper)

@@ -13,6 +13,7 @@ from math import factorial, isfinite, perm
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations import validate
 from robot_dyn.foundations.arithmetic import Array, Scalar
@@ -129,22 +130,22 @@ def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
     return q, v, 2 * a
 
 
-def hold(q: Any) -> PiecewisePolynomial:
+def hold(q: ArrayLike) -> PiecewisePolynomial:
     """Return a reference at rest at q, shape (n,); raise a ControlError for other shapes."""
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def quintic(
-    q0: Any,
-    q1: Any,
+    q0: ArrayLike,
+    q1: ArrayLike,
     duration_s: float,
     *,
     start_s: float = 0.0,
-    v0: Any = 0.0,
-    v1: Any = 0.0,
-    a0: Any = 0.0,
-    a1: Any = 0.0,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+    a0: ArrayLike = 0.0,
+    a1: ArrayLike = 0.0,
 ) -> PiecewisePolynomial:
     """Return the quintic from q0 to q1.
 
@@ -178,7 +179,7 @@ def quintic(
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def via_points(
-    times_s: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0
+    times_s: ArrayLike, points: ArrayLike, *, kind: str = "quintic", v0: ArrayLike = 0.0, v1: ArrayLike = 0.0
 ) -> PiecewisePolynomial:
     """Return the spline through points at prescribed times, from rest to rest unless end velocities are passed.
 

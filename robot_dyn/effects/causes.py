@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.effects.carried_payload import robot_with
 from robot_dyn.effects.effect import Drive, Stateful, numbered
@@ -67,7 +68,7 @@ class Causes(Answer, Value):
         yield Table(("joint", "t [s]", "unit", "torque", *names), tuple(out))
 
 
-def torques_by_cause(plant: Plant | Dynamics, t: Any, q: Any, v: Any, a: Any) -> Causes:
+def torques_by_cause(plant: Plant | Dynamics, t: ArrayLike, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Causes:
     """Compute the torque that a motion needs, by cause; for a run, use `run.causes()`.
 
     Dry friction is 0 on a joint whose velocity is exactly 0, as in `Plant.inverse_dynamics`: the torque that holds the
@@ -205,7 +206,9 @@ def _bounds(force: SetValued, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return least, most
 
 
-def motion(n: int, t: Any, q: Any, v: Any, a: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def motion(
+    n: int, t: ArrayLike, q: ArrayLike, v: ArrayLike, a: ArrayLike
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Check times (k,) and a motion (k, n), and return them as arrays."""
     t = rows("t", t)
     arrays = [rows(name, x, n) for name, x in (("q", q), ("v", v), ("a", a))]

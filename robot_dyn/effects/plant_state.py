@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.effects.effect import numbered
 from robot_dyn.effects.hold import Hold
@@ -19,6 +20,7 @@ from robot_dyn.foundations.validate import instance, number, one_state
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.info import no_torque
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
 
 
@@ -93,7 +95,14 @@ class PlantState(Answer, Value):
             )
 
 
-def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: float | None = None) -> PlantState:
+def plant_state(
+    plant: Plant | Dynamics,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike | None = None,
+    tau: ArrayLike | None = None,
+    t: float | None = None,
+) -> PlantState:
     """Evaluate a plant, or a robot, at a state: tau from a, or a and the joints held at rest from tau.
 
     Raises:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.effects.effect import Force
 from robot_dyn.effects.plant import Plant
@@ -86,12 +87,12 @@ class Why(Answer):
 
 def why(
     plant: Plant | Dynamics,
-    q: Any,
-    v: Any,
-    a: Any | None,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike | None,
     joint: str,
     *,
-    tau: Any | None = None,
+    tau: ArrayLike | None = None,
     t: float | None = None,
 ) -> Why:
     """Split the torque of a joint by link and cause.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
@@ -28,7 +29,7 @@ def from_samples(
     joints: Any = None,
     unit: str | None = None,
     ends: str | None = None,
-    q0: Any = None,
+    q0: ArrayLike | None = None,
     start_s: float | None = None,
     topic: str | None = None,
 ) -> Plan:

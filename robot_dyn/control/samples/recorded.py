@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control.samples.sources import table_of
 from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of, size, unit_of
@@ -75,7 +76,7 @@ def recorded(
     time: Any = None,
     joints: Any = None,
     unit: Any = None,
-    q0: Any = None,
+    q0: ArrayLike | None = None,
     topic: Any = None,
     least: int = 2,
 ) -> Recorded:

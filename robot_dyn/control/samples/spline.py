@@ -10,9 +10,10 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import Any, final
+from typing import final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
 from robot_dyn.foundations.errors import ControlError
@@ -42,7 +43,7 @@ class Samples(PiecewisePolynomial):
     """
 
     @np.errstate(all="ignore")  # overflow raises an error
-    def __init__(self, t: Any, q: Any, v: Any = None, a: Any = None) -> None:
+    def __init__(self, t: ArrayLike, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None) -> None:
         q = numbers("q", q, ("m", "n"))
         if len(q) < 2:
             raise ControlError(f"q: at least 2 samples are needed, got {len(q)}; to rest at one position, use hold(q)")
