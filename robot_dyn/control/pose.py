@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.control.levenberg_marquardt import Descent, descend, held
 from robot_dyn.control.orientation import rotation_vector
@@ -27,6 +26,10 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes
 from robot_dyn.queries.units import of_joint
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _SOUGHT = 1e-11  # largest ‖e‖ of a descent, in [m] and [rad]: below usual tolerances, above rounding
 _ROTATION = 1e-6  # largest entry of RᵀR − 1 for a rotation
@@ -100,7 +103,7 @@ class InverseKinematics(Answer, Value):
 
 def inverse_kinematics(
     arm: Robot,
-    pose: Any,
+    pose: ArrayLike | tuple[ArrayLike, ArrayLike | None],
     *,
     frame: str,
     q0: ArrayLike | None = None,
@@ -217,7 +220,7 @@ def _limits(arm: Robot, q: np.ndarray, blocked: np.ndarray) -> tuple[str, ...]:
     )
 
 
-def _start(arm: Robot, q0: ArrayLike | None) -> np.ndarray:
+def _start(arm: Robot, q0: Any) -> np.ndarray:
     """Return the first start; raise a PlanError if it is outside the limits."""
     if q0 is None:
         both = np.isfinite(arm.lower) & np.isfinite(arm.upper)

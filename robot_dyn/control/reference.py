@@ -10,16 +10,19 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
 from math import factorial, isfinite, perm
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.foundations import validate
 from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.errors import ControlError, QueryError, shown
 from robot_dyn.foundations.validate import choice, duration, times
-from robot_dyn.foundations.values import Value
+from robot_dyn.foundations.values import ArrayField, Value
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 # number of prescribed values at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}
@@ -57,8 +60,8 @@ class PiecewisePolynomial(Reference):
         coefficients: cᵢⱼ of (t − tᵢ)ʲ, shape (k, d + 1, n), in [rad/sʲ] or [m/sʲ].
     """
 
-    breaks: Any
-    coefficients: Any
+    breaks: ArrayField
+    coefficients: ArrayField
 
     def __post_init__(self) -> None:
         table = numbers("coefficients", self.coefficients, ("k", "d + 1", "n"))
@@ -257,7 +260,7 @@ def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndar
     return data
 
 
-def increasing(name: str, values: Any, count: int) -> np.ndarray:
+def increasing(name: str, values: ArrayLike, count: int) -> np.ndarray:
     """Return increasing times as a read-only array, (count,); raise a ControlError if they do not increase."""
     times = numbers(name, values, (count,))
     if not (np.diff(times) > 0).all():

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.effects.carried_payload import robot_with
 from robot_dyn.effects.effect import Drive, Stateful, numbered
@@ -23,6 +22,10 @@ from robot_dyn.foundations.validate import rows
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit, without_rounding
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 OF_BODIES = "inertia", "Coriolis", "gravity"
 _ROUNDING = 1e-12  # relative to the terms; a torque at its bound may exceed it by this much
@@ -154,7 +157,7 @@ def exerted_torques(
     bare = _inverse_dynamics(plant.dynamics, q, v, a)
     for j, name in enumerate(names[len(forces) :]):
         rows_carried, alone = carried[:, j], [i == j for i in range(len(payloads))]
-        loaded: Any = robot_with(plant.dynamics, payloads, alone)
+        loaded = robot_with(plant.dynamics, payloads, alone)
         with_payload = _inverse_dynamics(loaded, q[rows_carried], v[rows_carried], a[rows_carried])
         exerted[name][rows_carried] = bare[rows_carried] - with_payload
     if tau is not None:

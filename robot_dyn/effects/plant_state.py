@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.effects.effect import numbered
 from robot_dyn.effects.hold import Hold
@@ -22,6 +21,9 @@ from robot_dyn.model.info import no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @final

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.effects.effect import Force
 from robot_dyn.effects.plant import Plant
@@ -21,6 +20,10 @@ from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_texts, unit, without_rounding
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _AT_REST = "dry friction and stops, at rest"
 _CAUSES: tuple[str, ...] = "inertia", "Coriolis", "gravity", "effect"

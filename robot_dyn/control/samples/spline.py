@@ -10,13 +10,16 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
 from robot_dyn.foundations.errors import ControlError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _MISSED = 1e-6  # relative to the largest sample: far above rounding, far below the error of a failed spline
 
