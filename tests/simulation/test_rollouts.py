@@ -286,7 +286,7 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [("replay", "--html", "page.html"), ("diff", "run.npz")], ids=lambda command: command[0]
+    "command", [("replay", "--html", "page.html"), ("diff-runs", "run.npz")], ids=lambda command: command[0]
 )
 def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
     """A batch is not reported as damaged; the advised remedy makes a file that they accept."""
