@@ -2,10 +2,10 @@
 
 Ctrl-C ends any command with exit code 130; its handler is installed before anything else is imported.
 
-commands/        the commands, by topic; those of tools are entry points `robot_dyn.commands`
+commands/        the commands, by topic; the tools add theirs as entry points `robot_dyn.commands`
 application.py   the application, its groups of commands, progress bars; completion.py and interrupts.py
-options.py       options that commands share: of a robot, and of a result with its figure and table
-arguments.py     values of arguments; terminal.py: the printer of answers as text or JSON, escaped
+options.py       options shared by commands: for a robot, and for a result with its figure and table
+arguments.py     values of arguments; terminal.py: prints answers as text or JSON, with escapes
 report.py        documents and tables of comparisons and runs
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def _end(*_: object) -> None:
-    """End the process: nothing has begun that would have to be undone."""
+    """End the process at once: nothing that needs cleaning up has started."""
     os.write(2, b"robot-dyn: interrupted\n")
     os._exit(130)
 
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def _run() -> Any:
-    """The exit code of the command."""
+    """Run the command and return its exit code."""
     import warnings
 
     from robot_dyn.cli.application import program
@@ -74,10 +74,10 @@ def _run() -> Any:
             except SystemExit as end:
                 finish()
                 return end.code
-            except OSError as error:  # of the help, which typer prints
+            except OSError as error:  # while typer prints the help
                 raise failed(error) from None
         except RobotDynError as error:
             to_stderr(f"robot-dyn: error: {error}")
         except MemoryError:
-            to_stderr("robot-dyn: error: there is not enough memory; ask for less, or free some")
+            to_stderr("robot-dyn: error: out of memory; use fewer runs or samples, or free some memory")
     return 2

@@ -1,6 +1,7 @@
 """Solids of uniform or arbitrary density: m = ∫ ρ dx, c = (1/m) ∫ ρ x dx, I = ∫ ρ r̂ᵀ r̂ dx with r = x − c.
 
-Every solid has its centre of mass at the origin and its principal axes along x, y, z; `MassProperties.moved` places it.
+Solids of uniform density have their centre of mass at the origin and their principal axes along x, y, z;
+`MassProperties.moved` places them.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def box(mass: float, lx: float, ly: float, lz: float) -> MassProperties:
 
 
 def cylinder(mass: float, radius: float, height: float) -> MassProperties:
-    """Return a cylinder with its axis along z: I = m/12 · (3 r² + h²) twice, m r²/2; volume π r² h.
+    """Return a cylinder with its axis along z: I = m/12 · (3 r² + h², 3 r² + h², 6 r²), volume π r² h.
 
     Args:
         mass: Mass in [kg].
@@ -75,7 +76,7 @@ def sphere(mass: float, radius: float) -> MassProperties:
     return ellipsoid(mass, radius, radius, radius)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # the checks below refuse an overflow
+@np.errstate(over="ignore", invalid="ignore")  # the checks below reject values that overflow
 def from_density(
     density: Density, lower: Any, upper: Any, *, chart: Chart | None = None, points: int = 24
 ) -> MassProperties:
@@ -83,15 +84,15 @@ def from_density(
 
         m = ∫ ρ dx,   c = (1/m) ∫ ρ x dx,   I = ∫ ρ r̂ᵀ r̂ dx
 
-    Exact for a polynomial ρ of degree 2·points − 3 in each coordinate, and to rounding for a smooth one. It converges
-    slowly across a jump of ρ: integrate each part over a separate box and combine the results, or choose a chart in
-    which the surface of the body is a side of the box.
+    The result is exact for a polynomial ρ of degree 2·points − 3 in each coordinate, and converges fast for a smooth
+    ρ. It converges slowly across a jump of ρ: integrate each part over a separate box and combine the results, or
+    choose a chart in which the surface of the body is a side of the box.
 
     Args:
         density: ρ(x) in [kg/m³], of shape (...) for points x of shape (..., 3) in [m].
         lower: Lower corner of the box, shape (3,), in [m], or in the coordinates of the chart.
         upper: Upper corner, shape (3,).
-        chart: u (..., 3) ↦ (x (..., 3), |det ∂x/∂u| (...)), for example cylinder coordinates; None for x = u.
+        chart: u (..., 3) ↦ (x (..., 3), |det ∂x/∂u| (...)), for example cylindrical coordinates; None for x = u.
         points: Nodes along each axis, 1 to 100.
 
     Raises:
@@ -132,13 +133,13 @@ def _nodes(lower: Any, upper: Any, points: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def _field(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the values of a field at the nodes, or its one value."""
+    """Return the values of a field at the nodes, or its single value if it is constant."""
     return numbers(f"{name} of points (N, 3)", values, (), shape, least=0)
 
 
 def _squares(**lengths: Any) -> np.ndarray:
     checked = [number(name, length, above=0) for name, length in lengths.items()]
-    with np.errstate(over="ignore"):  # MassProperties refuses an infinite inertia
+    with np.errstate(over="ignore"):  # MassProperties rejects an infinite inertia
         return np.array(checked) ** 2
 
 

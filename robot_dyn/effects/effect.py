@@ -35,7 +35,8 @@ class _ClassName:
 class Effect(Value):
     """Anything that acts on the joints: a `Force`, a `Bound`, or a combination of these, its `parts`.
 
-    Subclass one of the four kinds below. Its methods are pure functions, called with
+    Subclass `Conservative`, `Dissipative`, `Active` or `Bound`; an effect with states also derives from `Stateful` or
+    `Drive`. Methods are pure functions, called with
 
         dynamics: the rigid bodies of the plant, a `Dynamics`
         t: time, a number, in [s]
@@ -214,7 +215,8 @@ class Drive(Stateful, Force, ABC):
     def driven(self, n: int) -> Sequence[int]:
         """Return the indices of the joints whose actuation the motors receive, on an arm with n joints."""
 
-    coupled: ClassVar[bool] = False  # True if motors may move with their joints; state_rate then also takes a
+    coupled: ClassVar[bool] = False
+    """True if motors may move with their joints; `state_rate` then also takes the acceleration a, (n,)."""
 
     @abstractmethod
     def speeds(self, z: Array) -> Array:
@@ -229,7 +231,15 @@ class Drive(Stateful, Force, ABC):
         return np.zeros(len(self.driven(n)))
 
     def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
-        """Return the power at one state from v, u, the torque and states of the drive, and the acceleration."""
+        """Return the power of the torque on the joints minus that of the actuation on the motors, at one state.
+
+        Args:
+            v: Velocity, (n,).
+            u: Actuation, (n,).
+            torque: Torque of the drive on the joints, (n,).
+            z: States of the drive.
+            a: Acceleration, (n,).
+        """
         return torque @ v - u[list(self.driven(len(v)))] @ self.speeds(z)
 
 
@@ -277,7 +287,7 @@ class Timed(Effect):
 def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
     """Raise an EffectError unless coefficients satisfy a relation for every joint.
 
-    Values by joint name or "urdf", and mismatched numbers of joints, are checked once a plant knows the joints.
+    Values by joint name or "urdf", and mismatched numbers of joints, are checked later, when a plant is built.
     """
     if not all(isinstance(x, float | np.ndarray) for x in values):
         return

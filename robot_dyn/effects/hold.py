@@ -1,8 +1,8 @@
-"""Joints held at rest by dry friction and rigid stops: the load of each, and the loads at which it breaks away.
+"""Joints held at rest by dry friction and rigid stops: the load on each, and the loads at which it breaks away.
 
     M a + C v + ∂V/∂q = τ + Σ τ_effect + λ,    load = −λ
 
-λ solves one convex problem for all joints, so the load of each joint depends on the state of all.
+λ solves one convex problem for all joints, so the load on each joint depends on the state of all joints.
 """
 
 from __future__ import annotations

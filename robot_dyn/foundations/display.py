@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-INK = "#010203"  # in a figure: the colour of the text of a page
+INK = "#010203"  # stands in figures for the colour of text on the page
 GRID = "#80808055"
-MOST_JOINTS = 8  # whose curves are drawn
-MOST_POINTS = 200  # of a curve: its least and largest values in each of half as many parts
+MOST_JOINTS = 8  # largest number of joints whose curves are drawn
+MOST_POINTS = 200  # of a curve: longer ones keep the minimum and maximum of each of 100 parts
 _COLOURS = ("#4c8bf5", "#e8710a", "#1e9e55", "#d93a8f", "#9a6af0", "#b58900", "#00a3b4", "#8d6e63")
 _WIDE, _HIGH, _BAR = 3.9, 1.6, 0.2  # sizes of a plot, and height of a bar, in [inch]; two plots stand side by side
-_LONGEST = 32  # letters of the name of a bar
-_LARGEST, _LEAST = 1e300, 1e-99  # on an axis, and on one of logarithms: Matplotlib computes beyond its ends
-_MOST_ROWS = 40  # of a table; a longer one scrolls
-_NARROW = 4  # columns of a table that a narrow page has room for
-# more specific than the styles of notebooks, which align all cells at the right
+_LONGEST = 32  # largest number of characters in the name of a row
+_LARGEST, _LEAST = 1e300, 1e-99  # bounds of linear and logarithmic axes: Matplotlib needs room beyond the ends
+_MOST_ROWS = 40  # a longer table scrolls
+_NARROW = 4  # largest number of columns that fit on a narrow page
+# more specific than the styles of notebooks, which align all cells to the right
 _STYLE = (
     "<style>.robot-dyn{font:13px/1.45 system-ui,sans-serif;max-width:70em}"
     ".robot-dyn.robot-dyn table{border-collapse:collapse;font-size:inherit;margin:.5em 0;background:none;color:inherit}"
@@ -61,16 +61,16 @@ def text(lines: str | Iterable[str]) -> str:
 
 
 def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collection[str]) -> str:
-    """Return a table of texts; columns not listed in `words` are aligned at the right.
+    """Return a table of texts; columns not listed in `words` are right-aligned.
 
-    On a narrow page each row of a table of many columns is a block, whose cells have their headings.
+    On a narrow page, each row of a table with more than 4 columns becomes a block of cells labelled by their headings.
     """
     kinds = ["" if name in words else " class=n" for name in heading]
     is_wide = len(heading) > _NARROW
-    of = [f' data-of="{escape(name)}"' if is_wide else "" for name in heading]
+    labels = [f' data-of="{escape(name)}"' if is_wide else "" for name in heading]
     head = "".join(f"<th{kind}>{escape(name)}</th>" for kind, name in zip(kinds, heading, strict=True))
     rows = [
-        "".join(f"<td{kind}{name}>{escape(cell)}</td>" for kind, name, cell in zip(kinds, of, row, strict=True))
+        "".join(f"<td{kind}{label}>{escape(cell)}</td>" for kind, label, cell in zip(kinds, labels, row, strict=True))
         for row in cells
     ]
     body = "".join(f"<tr>{row}</tr>" for row in rows)
@@ -103,12 +103,12 @@ def inline(figure: Figure, label: str = "") -> str:
 
     Args:
         figure: The figure.
-        label: Its description for readers who do not see it.
+        label: Description for readers who cannot see the figure.
     """
     from matplotlib import rc_context
 
     stream = io.StringIO()
-    with rc_context({"svg.fonttype": "none"}):  # texts stay texts, which can be searched and read aloud
+    with rc_context({"svg.fonttype": "none"}):  # text stays text, which can be searched and read aloud
         figure.savefig(stream, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None})
     svg = stream.getvalue()
     dropped = r'<!--.*?-->|<metadata>.*?</metadata>| xmlns:xlink="[^"]*"|xlink:(?=href)'
@@ -119,7 +119,7 @@ def inline(figure: Figure, label: str = "") -> str:
 
 
 def drawable(name: str) -> str:
-    """Return a text in which letters that the font of figures lacks are spelled by their code points; lines stay."""
+    """Return a text with characters missing from the font of figures replaced by code points; line breaks are kept."""
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
     font = get_font(findfont(FontProperties()))
@@ -127,7 +127,7 @@ def drawable(name: str) -> str:
 
 
 def _axes(label: str, height: float, names: Iterable[str] = ()) -> Any:
-    """Return axes whose lower one has a label; names of rows stand at the left."""
+    """Return axes with a label on the x axis and the names of rows, if any, along the y axis."""
     from matplotlib.figure import Figure
 
     axes = Figure(figsize=(_WIDE, height), facecolor="none").add_subplot(facecolor="none")
@@ -202,7 +202,7 @@ def levels(label: str, values: Mapping[str, float], limit: float) -> str:
 
     Args:
         label: Name of the quantity, with the unit.
-        values: Values by the names of the rows; values that are not finite and positive are omitted.
+        values: Values by the names of the rows; values that are not both finite and positive are omitted.
         limit: Limit in the unit of the values; omitted unless finite and positive.
     """
     positive = {name: min(max(x, _LEAST), 1 / _LEAST) for name, x in values.items() if isfinite(x) and x > 0}
@@ -217,6 +217,6 @@ def levels(label: str, values: Mapping[str, float], limit: float) -> str:
     if isfinite(limit) and limit > 0:
         axes.axvline(limit, color=_COLOURS[1], linestyle="--", clip_on=False)
         shown.append(limit)
-    low, high = np.floor(np.log10(min(shown))), np.ceil(np.log10(max(shown)))  # two numbers or more can be read
+    low, high = np.floor(np.log10(min(shown))), np.ceil(np.log10(max(shown)))  # at least two powers of ten
     axes.set_xlim(10.0**low, 10.0 ** max(high, low + 1))
     return inline(axes.figure, label)

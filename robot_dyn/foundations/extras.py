@@ -37,7 +37,7 @@ def version_of(name: str) -> str:
 
     try:
         installed = distribution(name)
-    except PackageNotFoundError:  # run from its folder
+    except PackageNotFoundError:  # run from a source folder, without being installed
         return "unknown"
     head = re.search("^Version: (.*)$", installed.read_text("METADATA") or "", re.MULTILINE)
-    return head[1] if head else installed.version  # slower: starts a mail parser
+    return head[1] if head else installed.version  # slower: it parses the metadata as an e-mail

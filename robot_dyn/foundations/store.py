@@ -1,7 +1,7 @@
 """Files of values: the arrays of a dataclass as .npz, other fields as JSON by pydantic, with limits on sizes.
 
-The member `about` is the JSON: a format and the fields of the value. Arrays are further members. The field of an array
-in the JSON contains the name of its member, which is the path of the field, for example `ledger/kinetic`.
+The member `about` is the JSON: a format and the fields of the value. Each array is another member; its field in the
+JSON contains the name of this member, which is the path of the field, for example `ledger/kinetic`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ABOUT = "about"
 _LONGEST = 10_000  # largest number of characters in a name
-_MOST = 20  # largest ratio of unpacked to packed bytes: zeros would have 1000
+_MOST = 20  # largest ratio of unpacked to packed bytes; an array of zeros has 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
@@ -41,8 +41,8 @@ class StoreError(RobotDynError):
 
 @final
 @dataclass
-class Found:
-    """The arrays of a file while the fields of a value are read from them.
+class Members:
+    """The members of a file while the fields of a value are read from them.
 
     Attributes:
         arrays: Arrays that no field has read yet, by name.
@@ -90,7 +90,7 @@ class Layout:
             shape = ", ".join(f"{axis} = {lengths[axis]}" if axis in lengths else str(axis) for axis in self.shape)
             raise ValueError(f"contains {x.dtype.name} {x.shape}, not {self.dtype} ({shape})")
         if x.dtype == np.bool_ and x.view(np.uint8).max(initial=0) > 1:
-            raise ValueError("contains bytes that are not truth values")
+            raise ValueError("contains bytes other than 0 and 1")
         if self.finite and not np.isfinite(x).all() and not (self.absent and np.isnan(x).all()):
             members.not_finite.append(name)
         return x
@@ -106,7 +106,7 @@ def _fits(length: int, allowed: Axis | tuple[Axis, ...], lengths: dict[str, int]
 
 @final
 class _NotStored:
-    """The mark of a field that is None in files."""
+    """Marker for fields that are None in files."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         return handler(type(None))
@@ -136,7 +136,7 @@ class StoredFormat(Generic[Stored]):
     kind: FileKind
     error: type[RobotDynError]
     remedy: str
-    check: Callable[[Stored, Found], None]
+    check: Callable[[Stored, Members], None]
     other: Callable[[Mapping[str, object]], str]
 
     @cached_property
@@ -160,7 +160,9 @@ class StoredFormat(Generic[Stored]):
             self.value(dict(arrays))
             return save(path, lambda stream: write_arrays(stream, arrays), self.error)
         except (StoreError, TypeError, ValueError) as error:
-            raise self.error(f"{path}: cannot be written: {error}; save a value as the library returns it") from None
+            raise self.error(
+                f"{path}: cannot be written: {error}; save a value unchanged, as the library returned it"
+            ) from None
 
     def load(self, path: str | Path, *others: StoredFormat[Other]) -> Stored | Other:
         """Return the value of a file in this format, or in another format of the same kind of file.
@@ -190,13 +192,13 @@ class StoredFormat(Generic[Stored]):
             raise StoreError(f"it has format {form}, but this version reads {self.name!r}; {self.other(about)}")
         if about.keys() != {"format", "value"}:
             raise StoreError(f"{ABOUT!r} has the keys {shorten(', '.join(map(str, about)))}, not format and value")
-        members = Found(arrays)
+        members = Members(arrays)
         try:
             value = self._adapter.validate_json(json.dumps([about["value"]]), context=members)[0]
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             message = f"{first['msg']}, got {shorten(repr(first['input']))}"
-            cause = first.get("ctx", {}).get("error", message)  # the message of a Layout is more precise
+            cause = first.get("ctx", {}).get("error", message)  # the error of a Layout is more precise
             raise StoreError(f"{shorten('/'.join(map(str, first['loc'][1:])) or ABOUT)!r}: {cause}") from None
         if arrays:
             raise StoreError(f"member {shorten(min(arrays))!r} is unknown to this version")
@@ -205,7 +207,7 @@ class StoredFormat(Generic[Stored]):
 
 
 def _about(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Take the JSON of a file out of its arrays."""
+    """Remove the JSON of a file from its arrays and return it."""
     text = arrays.pop(ABOUT, None)
     if text is None or text.dtype.kind != "U" or text.shape:
         raise StoreError(f"it has no text {ABOUT!r}")
@@ -231,7 +233,7 @@ def _without_arrays(value: Any, path: str, arrays: dict[str, np.ndarray]) -> Any
 
 
 def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays as .npz, compressed unless the ratio would exceed the limit of readers.
+    """Write arrays as .npz, compressed unless the ratio exceeds half the limit of readers.
 
     Raises:
         StoreError: If a name is not a valid name of a member.
@@ -250,14 +252,14 @@ def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
     """Return the arrays of a .npz file; nothing is unpickled.
 
     Raises:
-        StoreError: If the file is damaged or cut short, or contains anything else or far more than its size allows.
+        StoreError: If the file is damaged or cut short, contains other data, or unpacks to over 20 times its size.
     """
     try:
         most = _MOST * stream.seek(0, SEEK_END)
         with zipfile.ZipFile(stream) as file:
             members = {member.filename.removesuffix(".npy"): member for member in file.infolist()}
             if len(members) < len(file.infolist()):
-                raise StoreError("it contains two members of one name")
+                raise StoreError("it contains two members with the same name")
             if (size := sum(member.file_size for member in members.values())) > most:
                 raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
             return {name: _array(file, name, member) for name, member in members.items()}

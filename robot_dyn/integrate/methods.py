@@ -2,7 +2,7 @@
 
     y⁺ = method("RK4").step(system, t, y, h)
 
-Each method cites its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
+The module that defines a method cites its source.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The linkage: a Tree in numbers of one arithmetic, and its kinematics g(q) = Π gᵢ exp(ξ̂ᵢ qᵢ).
+"""The linkage: a Tree converted to numbers of one arithmetic, and its kinematics g(q) = Π gᵢ exp(ξ̂ᵢ qᵢ).
 
 Links without relative motion form one body; its spatial inertia is 𝓜 = Σ Adᵀ 𝓜_link Ad in the frame of the joint that
 carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
@@ -85,7 +85,7 @@ class Body:
 @final
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Change of frame from a body to its parent, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; two factors need fewer products.
+    """Change of frame from a parent to its child body, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; two factors need fewer products.
 
     Attributes:
         pose: Ad⁻¹ of the joint's constant placement, (6, 6).
@@ -98,19 +98,19 @@ class Step:
     origin: Array
 
     def turned(self, x: Array) -> Array:
-        """Return a vector in the parent's axes, in the body's axes: Rᵀ x."""
+        """Convert a vector from the parent's axes to the body's: Rᵀ x."""
         return apply(self.joint[..., 3:, 3:], apply(self.pose[3:, 3:], x))
 
     def twist(self, V: Array) -> Array:
-        """Return the parent's twist as the body's: Ad⁻¹ V."""
+        """Convert a twist from the parent's frame to the body's: Ad⁻¹ V."""
         return apply(self.joint, apply(self.pose, V))
 
     def wrench(self, F: Array) -> Array:
-        """Return a wrench on the body as one on the parent: Ad⁻ᵀ F."""
+        """Convert a wrench from the body's frame to the parent's: Ad⁻ᵀ F."""
         return apply(self.pose.T, apply(transpose(self.joint), F))
 
     def inertia(self, A: Array) -> Array:
-        """Return a symmetric form on the body's twists as one on the parent's: Ad⁻ᵀ A Ad⁻¹."""
+        """Convert a symmetric form on twists, such as 𝓜, from the body's frame to the parent's: Ad⁻ᵀ A Ad⁻¹."""
         for X in (self.joint, self.pose):
             A = symmetric(transpose(X) @ (A @ X))
         return A
@@ -173,7 +173,6 @@ class Configuration:
     """The linkage, or some of its bodies, at one configuration or a batch.
 
     Attributes:
-        batch: Shape of the batch axes.
         linkage: Linkage of the bodies.
         batch: Shape of the batch axes.
         in_parent: (R, p) of each body in its parent's frame, by index; parents first.

@@ -1,7 +1,8 @@
 """Regularity of M: singular at every configuration, so nearly singular that digits are lost, or regular.
 
-    κ = λ_max / λ_min  of  D⁻¹ M D⁻¹,  D = diag(√M_ii);    solutions of M a = τ have an error of about u κ, at most 8 n
-    u κ
+    κ = λ_max / λ_min  of  D⁻¹ M D⁻¹,  D = diag(√M_ii)
+
+Solutions of M a = τ have a relative error of about u κ, at most 8 n u κ.
 
 [Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, thm. 10.3]
 """
@@ -17,7 +18,7 @@ import numpy as np
 from robot_dyn.foundations.errors import SingularError, UndecidedError
 from robot_dyn.queries.dynamics import acceleration
 
-LEAST_DIGITS = 8  # of forward dynamics; with fewer, M counts as nearly singular
+LEAST_DIGITS = 8  # digits of forward dynamics; with fewer, M counts as nearly singular
 
 
 class NearlySingular(NamedTuple):
@@ -35,10 +36,11 @@ class NearlySingular(NamedTuple):
 
 
 class Regularity(NamedTuple):
-    """Result of the check whether M can be inverted.
+    """Result of the check that M can be inverted.
 
     Attributes:
-        singular: Function that returns the error to raise if M is singular at every q; None if it is not.
+        singular: Function that returns the error to raise if M is singular at every q, or if that cannot be decided in
+            float64; otherwise None.
         near: Loss of digits if M is nearly singular, otherwise None.
     """
 

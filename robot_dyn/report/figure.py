@@ -1,4 +1,4 @@
-"""The layout of a figure of a result: its sentence, its caption, axes in one style, and a legend."""
+"""Layout of the figure of a result: a heading sentence, a caption, axes in a common style, and a legend."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robot_dyn.view.plots.sheet import headed
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
-_PART = 0.75  # of the width, on a page, which is narrower than paper
+_PART = 0.75  # of the width, on the page of a notebook, which is narrower than paper
 _PAD = 0.08  # [inch] around axes and texts
 
 Colours = Mapping[str, Any]
@@ -21,7 +21,7 @@ Colours = Mapping[str, Any]
 PAGE: Colours = {"paper": "none", "ink": INK, "grid": GRID, "veil": "#80808022"} | {
     "lines": tuple(INK if colour == "#000000" else colour for colour in THEMES["light"]["lines"])
 }
-"""Colours for light and dark pages, without paper."""
+"""Colours for light and dark pages, with a transparent background."""
 
 
 class ResultError(RobotDynError):
@@ -29,9 +29,10 @@ class ResultError(RobotDynError):
 
 
 def sheet(width: float, height: float, sentence: str, caption: str, theme: str) -> tuple[SubFigure, Colours]:
-    """Return a figure of a size in [inch], headed by a sentence and a caption, without these, and its colours.
+    """Create a figure, width × height in [inch], with a sentence and a caption as its heading.
 
-    For the page of a notebook, which shows the sentence already, there is no heading.
+    Return the part below the heading, and the colours. On the page of a notebook, which already shows the sentence,
+    the figure has no heading and is narrower.
     """
     from robot_dyn.view.plots.shown import Figure
 
@@ -49,8 +50,8 @@ def sheet(width: float, height: float, sentence: str, caption: str, theme: str) 
 
 def programs(environment: Mapping[str, str], *names: str) -> str:
     """Return the versions of this library, Pinocchio and other programs, and the processor, for a caption."""
-    known = (f"{name} {environment[name]}" for name in ("robot-dyn", "pin", *names) if name in environment)
-    return f"{', '.join(known)}; {environment.get('processor', '')}"
+    versions = (f"{name} {environment[name]}" for name in ("robot-dyn", "pin", *names) if name in environment)
+    return f"{', '.join(versions)}; {environment.get('processor', '')}"
 
 
 def key(label: str, colour: str, **style: Any) -> Any:
@@ -69,7 +70,7 @@ def styled(axes: Any, colours: Colours, x: str, title: str, y: str = "") -> None
 
 
 def legend(figure: SubFigure, handles: Sequence[Any], colours: Colours, title: str = "") -> None:
-    """Explain the marks of a figure below it."""
+    """Add a legend below a figure."""
     drawn = figure.legend(
         handles=handles, title=title, ncols=4, frameon=False, fontsize=8.5, loc="outside lower left", alignment="left"
     )
@@ -79,5 +80,5 @@ def legend(figure: SubFigure, handles: Sequence[Any], colours: Colours, title: s
 
 
 def ink(colours: Colours) -> dict[str, Any]:
-    """Return how text is written."""
+    """Return the properties of text: the colour of ink, and no mathtext."""
     return {"color": colours["ink"], "parse_math": False}

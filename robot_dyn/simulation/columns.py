@@ -1,7 +1,7 @@
-"""Columns of a table, with quantity, joint and unit, as a dictionary, a DataFrame and a Dataset.
+"""Columns of a table, with quantity, joint and unit, as a dictionary, a DataFrame or a Dataset.
 
-A heading is a quantity, its joint or effect, and its unit, for example "q elbow_joint [rad]". In a Dataset a quantity
-has the dimensions of rows and joints.
+A heading is a quantity, its joint or effect, and its unit, for example "q elbow_joint [rad]". In a Dataset, a quantity
+with a column for each joint has the dimensions row and joint.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Column:
     """A column of a table.
 
     Attributes:
-        quantity: Such as "q".
-        values: Values by row.
+        quantity: Name of the quantity, for example "q".
+        values: Values, one per row.
         unit: Unit; empty if there is none.
         of: Joint, effect or number that the quantity belongs to; empty if it has one column only.
         title: The quantity in words.
@@ -53,7 +53,7 @@ def by_heading(columns: Iterable[Column]) -> dict[str, np.ndarray]:
     """Return the columns as a dictionary.
 
     Raises:
-        QueryError: If two have the same heading, so that one of them would be lost.
+        QueryError: If two columns have the same heading.
     """
     columns = list(columns)
     table = {column.heading: column.values for column in columns}

@@ -246,7 +246,7 @@ def test_options_have_their_names_without_docstrings() -> None:
 
 
 def test_a_command_keeps_its_own_help() -> None:
-    assert "exit code is 1 if it diverges" in re.sub(r"\s+", " ", said("simulate", "--help"))
+    assert "exit code is 1 if the run diverges" in re.sub(r"\s+", " ", said("simulate", "--help"))
 
 
 def test_commands_without_a_known_group_come_last(monkeypatch: pytest.MonkeyPatch) -> None:

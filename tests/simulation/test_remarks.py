@@ -223,7 +223,7 @@ def test_memory_does_not_grow_with_the_run() -> None:
         observer.filled = part.shape[1]
         observer.columns[0, : observer.filled] = 1e-3 * (1 + first + np.arange(part.shape[1]))
         observer.columns[1:, : observer.filled] = part
-        observer.look(end=True)
+        observer.process(end=True)
     edges, low, high = observer.windows
     assert len(low) == len(high) == len(edges) - 1 <= 256
     assert edges[0] == 0.0 and edges[-1] == pytest.approx(300.0) and (np.diff(edges) > 0).all()

@@ -219,7 +219,7 @@ def test_a_file_with_two_members_of_one_name_is_refused(run, tmp_path: Path) -> 
     np.save(stream, run.q + 1.0)
     with zipfile.ZipFile(path, "a") as file:
         file.writestr("q", stream.getvalue())
-    with pytest.raises(RunFileError, match="two members of one name"):
+    with pytest.raises(RunFileError, match="two members with the same name"):
         rd.read(path)
 
 

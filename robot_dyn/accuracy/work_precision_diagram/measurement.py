@@ -1,4 +1,4 @@
-"""Measurement: every method under test runs its ladder as far as useful, then all runs are timed in turns."""
+"""Measurement: every method under test runs its ladder, from coarse to fine; then all runs are timed in turns."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from robot_dyn.report.time_budget import Budget, OvertimeError
 from robot_dyn.report.timing import Timed, take_turns
 
 _RUN_FRACTION = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
-_RESERVE = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
-_INTERPRETED_RESERVE = 0.05  # of the budget, for repeats of interpreted runs
+_RESERVE = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, kept for repeats when new runs start
+_INTERPRETED_RESERVE = 0.05  # of the budget, kept for repeats of interpreted runs while the others are repeated
 _MAX_LATE = 3  # runs of a ladder that may exceed their time limit
 _HARD = 4.0  # time limit of a run, over its planned time
 
@@ -31,7 +31,7 @@ _HARD = 4.0  # time limit of a run, over its planned time
 @final
 @dataclass(eq=False)
 class Walk:
-    """A method under test, its runs from coarse to fine, and the reason why there is no finer one."""
+    """A method under test, its runs from coarse to fine, and the reason why its ladder ended."""
 
     method: MethodUnderTest
     runs: list[tuple[Point, Timed]] = field(default_factory=list)
@@ -90,7 +90,7 @@ def measure(
 def _walk(walk: Walk, reference: Reference, budget: Budget) -> str:
     """Run from coarse to fine, until the error of the reference is reached or the next run would take too long.
 
-    Return the reason for the end.
+    Return the reason why the ladder ended.
     """
     method, before, late = walk.method, 0.0, 0
     longest = _RUN_FRACTION[method.engine] * budget.seconds
@@ -113,7 +113,7 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> str:
             late += 1
             if late == _MAX_LATE or any(isfinite(point.error) for point, _ in walk.runs):
                 return f"a run with {method.by} {setting:.3g} takes more than {_HARD * longest:.2g} s"
-            # otherwise continue: steps that are too long may lead to a motion that takes longer
+            # otherwise continue: with steps that are too long, the computed motion itself may take longer to integrate
         except RobotDynError as error:
             return str(error)
     return "there is no finer setting"

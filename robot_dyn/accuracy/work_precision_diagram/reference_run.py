@@ -1,7 +1,7 @@
-"""Reference solution: two runs by methods of different kind, with tighter settings than all other runs.
+"""Reference solution: two runs by methods of different kinds, with tighter settings than all other runs.
 
-The distance of the two runs is the error of the reference. Where they part, as in chaotic motion, the horizon is cut.
-Past the horizon methods are judged by energy, and by the return error:
+The distance between them is the error of the reference. If they part, as in chaotic motion, the horizon ends there.
+Past the horizon, methods are judged by the energy error and the return error:
 
     |q − q₀|   after a run to the end and, with reversed velocity, back to the start
 
@@ -47,14 +47,14 @@ from robot_dyn.simulation.simulate import simulate
 
 _PARTED = 1e-9  # of the positions: runs that differ by more have parted
 _COARSE = 1e-6  # same, if the second run could not be refined down to rounding
-_STAGNANT = 0.3  # decades: twice as many steps that gain less do not refine
+_STAGNANT = 0.3  # decades: if doubling the number of steps gains less, the run is fully refined
 _ORDERLY = 1e-6  # distance at the first record below which refinement is judged
-_ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that is small enough: interpreted shorter steps take seconds
-_ROUGH, _ROUGHLY = 1e-11, 1e-6  # a looser tolerance, and the distance of its run from the first that ends the horizon
+_ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that ends refinement: interpreted runs take seconds
+_ROUGH, _ROUGHLY = 1e-11, 1e-6  # a looser tolerance; the horizon ends where its run is this far from the first
 _MAX_LATE = 3  # runs of one method that may take too long
 _LOST = 0.1  # [rad] or [m]: runs that differ by more have nothing in common
 _MIN_HORIZON = 1e-3  # of the duration
-_ULPS = 4.0  # of rounding in any position
+_ULPS = 4.0  # smallest error of a reference, in units of rounding of the largest position
 _FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-12, 1e-14))
 _SECOND = ("GaussLegendre6", "Rodas5PFixed")
 _REFERENCE_FRACTION, _MIN_LIMIT_S = 0.08, 0.5  # of the budget, for one reference run, with a lower limit in [s]
@@ -76,9 +76,9 @@ class Reference(Value):
         error: Distance of the two runs, in [rad] or [m]; smaller errors are not resolved.
         methods: Descriptions of the two methods; q is from the first.
         horizon_s: End of the reference, in [s].
-        parted_s: Time at which the two runs, or runs at tolerances of 3e-14 and 1e-11, parted, in [s]. It ends the
-            horizon. None if they did not part.
-        lost_s: Time at which the runs at these tolerances differed by 0.1 rad or m, in [s]; None if they did not.
+        parted_s: Time at which the first run parted from the second, or from a run at a tolerance of 1e-11, in [s].
+            The horizon ends there. None if they did not part.
+        lost_s: Time at which the first run and the one at 1e-11 differed by 0.1 rad or m, in [s]; None if they did not.
     """
 
     t: np.ndarray = field(metadata=UNREPORTED)
@@ -103,7 +103,7 @@ class Reference(Value):
 
 
 def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
-    """Return the setup up to the horizon, and its reference.
+    """Return the setup, shortened to the horizon, and its reference.
 
     Raises:
         HorizonError: If the motion has no reference.
@@ -123,11 +123,11 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
         end = _passes(other.t, other.distance, size * (_PARTED if other.refined else _COARSE))
         if end is None:
             error = max(float(other.distance.max()), _ULPS * np.finfo(float).eps * size)
-            return setup, Reference(run, q, error, (first, other.words), setup.duration_s, parted, lost)
+            return setup, Reference(run, q, error, (first, other.description), setup.duration_s, parted, lost)
         parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
         if end < _MIN_HORIZON * requested:
             raise HorizonError(
-                f"{first} and {other.words} part within {_MIN_HORIZON:g} of the duration, at t = {end:.2g} s: no"
+                f"{first} and {other.description} part within {_MIN_HORIZON:g} of the duration, at t = {end:.2g} s: no"
                 " error can be measured; use a shorter run, or a less sensitive start"
             )
         setup = replace(setup, duration_s=end, record_every_s=0.0)
@@ -178,9 +178,9 @@ def _longest(budget: Budget) -> float:
 @final
 @dataclass(frozen=True, eq=False)
 class _Other:
-    """A run by another method, with its distance from the first at times t; `refined` if shorter steps gain nothing."""
+    """A run by another method, with its distance from the first at times t; `refined`: shorter steps gain nothing."""
 
-    words: str
+    description: str
     t: np.ndarray
     distance: np.ndarray
     refined: bool
@@ -202,13 +202,13 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
 
 
 def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
-    """Return runs with shorter and shorter steps, until these gain nothing or take too long."""
+    """Yield runs with shorter and shorter steps, until shorter steps gain nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
     for step in step_ladder(setup.record_every_s, 1):
-        words = f"{setup.method.name}, step {step:.3g} s"
-        budget.report(f"reference: {words}")
+        description = f"{setup.method.name}, step {step:.3g} s"
+        budget.report(f"reference: {description}")
         run = _in_time(replace(setup, step_s=step), budget)
-        late += run is None  # steps that are too long may lead to a motion that takes longer
+        late += run is None  # with steps that are too long, the computed motion may take longer to integrate
         if late == _MAX_LATE:
             return
         if run is not None and run.q is not None:
@@ -216,21 +216,21 @@ def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iter
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
             is_orderly = distance[1] < _ORDERLY
             is_refined = bool((is_orderly and size > before - _STAGNANT) or distance.max() < _ENOUGH[setup.engine])
-            yield _Other(words, times, distance, is_refined)
+            yield _Other(description, times, distance, is_refined)
             if is_refined or 2 * run.time_s > limit:
                 return
             before = size if is_orderly else np.inf
 
 
 def _distance(t: np.ndarray, q: np.ndarray, run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times that the records share with a run, (k,), and the largest distance over joints there, (k,)."""
+    """Return the times shared by the records and a run, (k,), and the largest distance over joints at each, (k,)."""
     place = common(run.t, t)
     is_shared = place >= 0
     return t[place[is_shared]], np.abs(np.asarray(run.q)[is_shared] - q[place[is_shared]]).max(axis=1)
 
 
 def _passes(t: np.ndarray, distance: np.ndarray, level: float) -> float | None:
-    """Return the first time at which a distance exceeds a level, by its logarithm between records, or None."""
+    """Return the first time at which a distance exceeds a level, or None; its logarithm is interpolated in time."""
     above = np.flatnonzero(distance > level)
     if not len(above):
         return None
@@ -263,12 +263,12 @@ def past_horizon(
     integrators: Mapping[str, Integrator | Adaptive],
     budget: Budget,
 ) -> tuple[PastHorizon, ...]:
-    """Return energy and return error of each method past the horizon.
+    """Return the energy error and the return error of each method over the whole duration.
 
     Args:
         setup: The setup over the whole duration.
         horizon_s: The horizon, up to which errors were measured.
-        ladders: The measured ladders; the first ladder of each method is used.
+        ladders: The measured ladders; for each method, the first one with a run that is fast enough is used.
         integrators: The methods, by name.
         budget: The time budget; a run may take a fiftieth of it.
     """
@@ -290,7 +290,7 @@ def past_horizon(
 
 
 def _there_and_back(setup: Setup, longest: float) -> tuple[float, float | None]:
-    """Return the energy residual and the return error of a run."""
+    """Return the energy residual and the return error of a run; None if the motion is driven or dissipates energy."""
     there, returned = _run(setup, longest), None
     if setup.controller is None and all(isinstance(effect, Conservative) for effect in setup.plant.effects):
         back = _run(replace(setup, q0=there.q[-1], v0=-there.v[-1]), longest)

@@ -30,12 +30,12 @@ def simulate(
 ) -> None:
     """Run a scene.
 
-    The exit code is 1 if it diverges. Ctrl-C ends the run and keeps its samples.
+    The exit code is 1 if the run diverges. Ctrl-C ends the run and keeps its samples.
 
     Options:
         output (RUN.npz): Save the run: as .npz for replay, plot and diff; or as .csv, .parquet, .nc or .mcap.
         csv (TABLE.csv): Write the samples as a table.
-        accuracy (ERROR): Largest error of q to have, in rad and m; pilot runs choose the method.
+        accuracy (ERROR): Largest acceptable error of q, in rad or m; pilot runs choose the method.
     """
     from robot_dyn.cli import report
     from robot_dyn.simulation.results.formats.save import TABLE, kinds
@@ -59,13 +59,13 @@ def simulate(
 
 @command(ASK)
 def explain(scene: Scene, /, as_json: Json = False) -> None:
-    """Print the equation that a scene integrates, and the source of each number."""
+    """Print a scene's equation and the source of each number."""
     show(rd.explain(Path(scene)), as_json=as_json)
 
 
 @command(ASK)
 def parameters(scene: Scene, /, as_json: Json = False) -> None:
-    """List the parameters of a scene that can vary from run to run."""
+    """List the parameters of a scene that a sweep can vary."""
     show(rd.parameters(rd.read_scene(scene)), as_json=as_json)
 
 

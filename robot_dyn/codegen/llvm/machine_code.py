@@ -34,8 +34,8 @@ class Passes:
 
     Attributes:
         level: Level of the passes over instructions, 0 to 3.
-        effort: Level of register allocation, 0 to 3; None for 3, or 1 for a long module, as the time of allocation
-            grows faster than linearly with the length of a block.
+        effort: Level of register allocation, 0 to 3; None for 3, or 1 for a long module, because the time of
+            allocation grows faster than linearly with the length of a block.
     """
 
     level: int = 3
@@ -49,7 +49,7 @@ def addresses(
     functions: Sequence[str], key: str, write: Write, store: Store | None, about: str = "",
     passes: Passes = _ALL,
 ) -> tuple[int, ...]:  # fmt: skip
-    """Return the addresses of functions of a module, which is restored from the store if present.
+    """Return the addresses of functions of a module; it is loaded from the store if it is there, otherwise compiled.
 
     Args:
         functions: Names of the functions, without the prefix of the module.
@@ -125,7 +125,7 @@ def _machine(effort: int = 3) -> binding.TargetMachine:
 
 @cache
 def _engine() -> binding.ExecutionEngine:
-    """Return the execution engine of the machine code of this process."""
+    """Return the execution engine into which this process loads all machine code."""
     for name, location in python_function.addresses().items():
         binding.add_symbol(name, location)
     return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())

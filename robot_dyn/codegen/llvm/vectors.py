@@ -93,7 +93,7 @@ class Vectors:
         return x if self.count == 1 else self.builder.insert_element(vector, x, ir.Constant(I32, i))
 
     def any(self, mask: ir.Value) -> ir.Value:
-        """Return the condition that a mask holds in some lane."""
+        """Return a condition that is true if a mask is true in any lane."""
         if self.count == 1:
             return mask
         bits = ir.IntType(self.count)
@@ -101,7 +101,7 @@ class Vectors:
 
     @property
     def none(self) -> ir.Value:
-        """Mask that holds in no lane."""
+        """Mask that is false in every lane."""
         return Vectors(self.builder, I1, self.count).constant(0)
 
     def absolute_sum(self, vectors: Iterable[ir.Value], total: ir.Value) -> ir.Value:
@@ -133,7 +133,7 @@ def _operator(instruction: str, *flags: str, reflected: bool = False) -> Callabl
 
 @final
 class Lanes:
-    """A vector of numbers or integers under Python's operators, so that one formula serves vectors of any length.
+    """A vector of floats or integers with Python's operators, so that one formula serves vectors of any length.
 
     Attributes:
         vectors: Length and type.
@@ -171,7 +171,7 @@ class Lanes:
         return self.vectors.builder.fcmp_ordered("<", self.value, self.of(other))
 
     def choose(self, mask: ir.Value, other: Lanes | float) -> Lanes:
-        """Return this value where the mask holds, otherwise the other."""
+        """Return this value where the mask is true, otherwise the other."""
         return self.like(self.vectors.builder.select(mask, self.value, self.of(other)))
 
 
@@ -184,6 +184,6 @@ def polynomial(z: Lanes, coefficients: tuple[float, ...]) -> Lanes:
 
 
 def align_stack(function: ir.Function) -> None:
-    """Align the vectors that a function stores on the stack to cache lines, for any caller."""
+    """Align the vectors that a function stores on the stack to cache lines, even if the caller is less aligned."""
     function.attributes.add("nounwind")  # llvmlite omits the alignment without another attribute
     function.attributes.alignstack = LINE

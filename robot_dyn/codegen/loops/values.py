@@ -1,4 +1,4 @@
-"""Values while a function is translated: LLVM values with their types in the subset."""
+"""Values in a function during its translation: LLVM values with their types in the subset of Python."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from robot_dyn.codegen.loops.kinds import (
 )
 
 UNWRITTEN = ir.Constant(I64, ir.Undefined)
-"""Placeholder of all LLVM values while types are inferred and nothing is written."""
+"""Placeholder for every LLVM value during type inference, when no instructions are written."""
 
 
 @final
 class _Silent:
-    """Substitute for LLVM's builder that writes nothing, while types are inferred."""
+    """Substitute for LLVM's builder during type inference; it writes nothing."""
 
     block: Any = None
 
@@ -119,12 +119,12 @@ class StaticValue:
 @final
 @dataclass(frozen=True)
 class Written:
-    """A function of a module.
+    """A translated function in an LLVM module.
 
     Attributes:
         ir: LLVM function.
         result: Type of the result.
-        may_fail: True if it returns the text of a failure first.
+        may_fail: True if the function can fail; it then returns the text of the failure, or null, before its result.
     """
 
     ir: ir.Function
@@ -162,7 +162,7 @@ def leaf_types(kind: Kind) -> list[ir.Type]:
 
 
 def leaves(value: Value) -> list[ir.Value]:
-    """Return the LLVM values of the parts."""
+    """Return the LLVM values of the parts of a value."""
     if isinstance(value, Scalar):
         return [value.ir]
     if isinstance(value, ArrayValue):
@@ -195,7 +195,7 @@ def of_leaves(kind: Kind, parts: Sequence[ir.Value]) -> Value:
 
 
 def times(x: Scalar, y: Scalar, builder: Builder) -> Scalar:
-    """Return a product of lengths, which does not overflow."""
+    """Return a product of lengths; LLVM may assume that it does not overflow."""
     if x.const is not None and y.const is not None:
         return number(x.const * y.const)
     if x.const == 1 or y.const == 1:

@@ -1,10 +1,10 @@
-"""Keys: SHA-256 digests of everything that stored code depends on, so that equal keys have equal contents.
+"""Keys: SHA-256 digests of everything that stored code depends on, so that equal keys mean equal contents.
 
     machine code of a kernel        its program, the source of the writer (`sources_of_the_writer`), its form
     machine code of a loop          the code of all functions it reaches (`loops.dependencies`), the types of its
                                     arguments, the source of the translator (`sources_of_the_translator`)
     programs of a state equation    its structure, with the definitions of user code (`store.definition`), and the
-                                    source of all code that may be traced (`sources_of_programs`); any processor
+                                    source of all code that may be traced (`sources_of_programs`), for any processor
 
 All keys include versions; those of machine code include the processor.
 """
@@ -21,12 +21,12 @@ from robot_dyn.foundations.extras import version_of
 
 _ROOT = Path(__file__).parents[2]
 _CODEGEN = _ROOT / "codegen"
-# Rooms above the simulation, which traced code cannot import: the layers in pyproject.toml ensure it.
+# Packages above the simulation, which traced code cannot import: the layers in pyproject.toml ensure this.
 _ABOVE = {"accuracy", "cli", "report", "scene", "tools", "view"}
 
 
 def digest(texts: list[str], *, processor: bool = True) -> str:
-    """Return the key of texts, versions and the processor; the texts include sources."""
+    """Return the key of texts, versions and the processor; callers include the digests of sources in the texts."""
     versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
     return digest_of_texts([*texts, *versions, platform.python_version(), *(processor_of_code() if processor else ())])
 
@@ -54,7 +54,7 @@ def sources_of_the_writer() -> str:
 def sources_of_the_translator() -> str:
     """Return the SHA-256 of the code that translates loops to machine code."""
     rooms = [*(_CODEGEN / "loops").glob("*.py"), *(_CODEGEN / "llvm").glob("*.py")]
-    # array_operations writes instructions itself, which no translated code contains
+    # array_operations emits instructions itself, so that the code of translated functions does not include it
     return digest_of_files(_CODEGEN, [*rooms, _CODEGEN / "array_operations.py"])
 
 

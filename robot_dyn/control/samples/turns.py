@@ -15,7 +15,7 @@ import numpy as np
 from robot_dyn.control.samples.recorded import Recorded
 
 _WITHIN = 2 * np.pi + 1e-3  # [rad]: one turn, with ends rounded to 3 decimals
-_LIKE = 0.1  # [rad]: plus twice the neighbouring steps, the largest difference of a step without its turn from them
+_LIKE = 0.1  # [rad]: allowed difference of a step without its turn from its neighbours, plus twice their size
 _MOST = np.pi / 2  # [rad]: upper bound of that difference
 _FAST = 1.5  # times the velocity limit: the largest speed of a step without its turn
 
@@ -41,7 +41,7 @@ class Turns:
 
 
 def joined_turns(recorded: Recorded) -> Turns:
-    """Return the samples with the angles of continuous joints unwrapped where whole turns are certain."""
+    """Unwrap the angles of continuous joints where whole turns are certain; return the result of the search."""
     steps, moved = whole_turns(recorded), np.diff(recorded.q, axis=0)
     continuous = np.array([kind == "continuous" for kind in recorded.arm.joint_types])
     within = continuous & (np.ptp(recorded.q, axis=0) <= _WITHIN)

@@ -47,11 +47,11 @@ class Identified(NamedTuple):
 
     Attributes:
         equation: The state equation.
-        compiled_form: The equation that is compiled: in a mode, with right angles to all digits of float64.
+        compiled_form: The equation that is compiled: in a mode, and with right angles exact to float64.
         inputs: Parameters of the machine code.
         described: The structure, the places of the parameters, and the options of the trace.
-        objects: Objects that are described by identity.
-        lasting: True if `described` identifies the equation also in another process.
+        objects: Objects that are compared by identity.
+        lasting: True if `described` also identifies the equation in other processes.
     """
 
     equation: StateEquation
@@ -82,7 +82,7 @@ def machine_code(
 
     Args:
         equation: The equation to compile.
-        method: Method of the run; its time loop is machine code if its steps can be. None for no loop.
+        method: Method of the run; its time loop is compiled too if its steps can be compiled. None for no loop.
         lanes: Number of runs in lock step.
         extras: See `trace`.
         swept: Names of the parameters that differ from run to run.
@@ -91,14 +91,14 @@ def machine_code(
         detects: True if steps in lock step detect which runs may pass a threshold.
 
     Raises:
-        TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
+        TraceError: If a part of the equation cannot be compiled; the message names it and a remedy.
     """
     identified = identify(equation, method, extras, swept, jacobian)
     return _with_loop(identified, _functions_of(identified, lanes, swept), method, lanes, cuts, detects, swept)
 
 
 def existing(identified: Identified, method: Method, cuts: bool) -> MachineCode | None:
-    """Return the machine code of a single run if it is in this process or in the store; or None.
+    """Return the machine code of a single run if this process or the store has it, otherwise None.
 
     Args:
         identified: The state equation of the run.
@@ -151,7 +151,7 @@ def _with_loop(
 
 
 def with_numbers(code: MachineCode, equation: StateEquation) -> MachineCode:
-    """Return the machine code for an equation that differs only in parameters, also in those that are not swept."""
+    """Return the machine code for an equation that differs only in parameters, including those that are not swept."""
     compiled_form = _compiled_form(equation, nonsmooth="problem" in code.code.programs)
     inputs = _parameters(compiled_form, code.swept)
     return replace(code, equation=equation, compiled_form=compiled_form, inputs=inputs)
@@ -163,10 +163,10 @@ def machine_code_of_constants(equation: StateEquation, method: Method, *, lanes:
     Args:
         equation: The equation to compile.
         method: Method with plain steps.
-        lanes: Number of runs in lock step. Samples of several runs are empty.
+        lanes: Number of runs in lock step. With several runs, samples are empty: no u, v or energy.
 
     Raises:
-        TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
+        TraceError: If a part of the equation cannot be compiled; the message names it and a remedy.
     """
     options = _traces(method, None if lanes == 1 else ())
     compiled_form = _compiled_form(equation, options.nonsmooth)
@@ -179,7 +179,7 @@ def machine_code_of_constants(equation: StateEquation, method: Method, *, lanes:
 def _shared(
     equation: StateEquation, inputs: tuple[Parameter, ...], lanes: int, swept: tuple[str, ...]
 ) -> dict[int, int]:
-    """Return the places of the parameters that all runs in lock step share, by index; they follow those of each run.
+    """Return the places of the parameters shared by all runs in lock step, by index; they follow those of each run.
 
     See `MachineCode.run_parameters` for the layout.
     """
@@ -229,21 +229,21 @@ def _parameters(compiled_form: StateEquation, swept: tuple[str, ...]) -> tuple[P
 
 
 def robot_to_compile(dynamics: object) -> Robot:
-    """Return the robot to compile, with right angles to all digits of float64.
+    """Return the robot to compile, with right angles exact to float64; see `model.right_angles`.
 
     Raises:
-        TraceError: If the dynamics are not those of a robot's file, or a joint has no inertia.
+        TraceError: If the dynamics were not loaded from a robot's file, or a joint has no inertia.
     """
 
     def compute() -> Robot | None:
         robot = robot_of(dynamics)
         if robot is None or not of_library(type(dynamics)):  # another class may have other equations
             raise TraceError(
-                f"{type(dynamics).__name__} comes from no robot's file and cannot be compiled: take a Robot, "
+                f"{type(dynamics).__name__} comes from no robot's file and cannot be compiled: use a Robot, "
                 "or engine='interpreted'"
             )
         if robot.joint_without_inertia is not None:
-            raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: take engine='interpreted'")
+            raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: use engine='interpreted'")
         return None if robot is dynamics else robot
 
     return _robots.get((dynamics,), (), compute) or cast(Robot, dynamics)
@@ -257,7 +257,10 @@ def _stored(identified: Identified) -> Programs | None:
 
 
 def interpreted_before(identified: Identified) -> list[float]:
-    """Return the number of evaluations of the interpreted runs of a structure, in a list that `choice` updates."""
+    """Return the evaluations spent in interpreted runs of a structure so far, as a list of one number.
+
+    `choice` updates this list.
+    """
     return _interpreted.get(identified.objects, (identified.described,), lambda: [0.0])
 
 
@@ -265,7 +268,7 @@ def _programs_of(identified: Identified) -> Programs:
     """Return the programs of a state equation, from the store or by a trace, which is stored.
 
     Raises:
-        TraceError: If a part of the equation cannot be compiled; names the part.
+        TraceError: If a part of the equation cannot be compiled; the message names it.
     """
     if (programs := _stored(identified)) is not None:
         return programs
@@ -287,7 +290,7 @@ def _traced(
     from robot_dyn.simulation.compiled.trace import trace
 
     def symbols_of(dynamics: Dynamics, part: Part) -> SymbolicDynamics:
-        """Return the equations of a robot in symbols, which are cached by its file, edits and parameters."""
+        """Return the symbolic equations of a robot, cached by its file, edits and parameters."""
         robot, of_robot = robot_to_compile(dynamics), tuple(x for x in inputs if x.part == part)
         if constants:  # cached symbols are valid for other values of the parameters, not for other constants
             return SymbolicDynamics(robot)

@@ -20,13 +20,13 @@ _DIRECTIONS = (-1, 0, 1)
 class Event:
     """A user-defined event: g(t, q, v) = 0.
 
-    A step of integration ends at the event. Within a step, g is evaluated on the dense output at each eighth, and a
-    minimum of |g| near 0 is searched for. So g may cross 0 twice between two eighths; a second minimum between them
-    may be missed.
+    An integration step ends at the event. Within a step, g is evaluated on the dense output at each eighth, and a
+    minimum of |g| near 0 is searched for. This detects two crossings between neighbouring eighths; a second
+    minimum between them may be missed.
 
     Attributes:
         function: g, a function of (t, q, v) that returns a number.
-        direction: 1 for crossings with growing g only, −1 with falling g only, 0 for both.
+        direction: 1 for crossings with increasing g only, −1 for decreasing g only, 0 for both.
         terminal: True to end the run at the event.
         name: Name for messages; by default the name of the function.
 
@@ -41,7 +41,7 @@ class Event:
 
     def __post_init__(self) -> None:
         if not callable(self.function):
-            raise QueryError(f"function: give one of (t, q, v), got {shown(self.function)}")
+            raise QueryError(f"function: give a function of (t, q, v), got {shown(self.function)}")
         if type(self.direction) is not int or self.direction not in _DIRECTIONS:
             raise QueryError(f"direction must be -1, 0 or 1, got {shown(self.direction)}")
         truth("terminal", self.terminal)
@@ -50,7 +50,7 @@ class Event:
             signature(self.function).bind(0.0, None, None)
         except TypeError:
             raise QueryError(f"event {self.function!r}: give a function of (t, q, v)") from None
-        except ValueError:  # the arguments of some functions written in C are unknown
+        except ValueError:  # some functions written in C do not expose their arguments
             pass
         if not self.name:
             object.__setattr__(self, "name", getattr(self.function, "__name__", type(self.function).__name__))
@@ -64,7 +64,7 @@ class Occurrence:
     Attributes:
         t: Time of the event, in [s].
         name: A phrase such as "upper stop of panda_joint2 touched", or the name of the user-defined event.
-        direction: 1 if the switching function grows, −1 if it falls.
+        direction: 1 if the switching function increases, −1 if it decreases.
         q: Position at the event, n numbers, in [rad] or [m].
         v: Velocity after the event, n numbers, in [rad/s] or [m/s].
         joint: Name of the joint of the event; empty for a user-defined event.

@@ -1,10 +1,10 @@
-"""A step of Moreau and Jean of a state equation: the convex problem, its solution, and the state after the step.
+"""A Moreau–Jean step of a state equation: the convex problem, its solution, and the state after the step.
 
-    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r the impulses of friction and stops:  −r ∈ h f ∂|v⁺| + N(v⁺)
+    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r the impulses of friction and stops:  −r ∈ h f ∂|v⁺| + 𝓝(v⁺)
 
-at q_m = q + h/2 v. The work of a force is that of its impulse at the mean velocity (v + v⁺)/2, so that the energy
-ledger contains the energy removed by stops and friction. Functions work on floats, or on symbols for machine code; see
-`integrate.time_stepping`.
+at q_m = q + h/2 v, with 𝓝 the normal cone of the bounds of v⁺. The work of a force is its impulse times the mean
+velocity (v + v⁺)/2, so that the energy ledger contains the energy removed by stops and friction. Functions work on
+floats, or on symbols for machine code; see `integrate.time_stepping`.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _solved(n: int, numbers: Array, place: Array) -> Array:
         for _ in range(PASSES - 1):
             if result[2 * n] > 0:
                 result = solution(n, numbers, result[n : 2 * n])
-    except NotPositiveDefiniteError:  # at a state far beyond all bounds: nan ends the run, as in machine code
+    except NotPositiveDefiniteError:  # the state has diverged: nan ends the run, as in machine code
         return np.full(2 * n + 1, np.nan)
     return result
 

@@ -4,8 +4,8 @@ With e(h) = q_h − q the error of a run of step h:
 
     order seen   |e(h)| ≈ |q_h − q_2h| / (2ᵖ − 1), if |q_h − q_mh| / |q_h − q_2h| is near (mᵖ − 1) / (2ᵖ − 1) for
                  m = 3 and 5: two of three companions may agree by chance
-    bounded      |e(h)| ≤ about max |q_h − q_mh| / (m − 1) over m = 2, 3, 5: divided for order 1 only, which every
-                 method keeps; steps of incommensurate lengths do not pass a switch at the same node
+    bounded      |e(h)| ≤ about max |q_h − q_mh| / (m − 1) over m = 2, 3, 5: divided as for order 1, which every
+                 method has; steps of incommensurate lengths do not pass a switch at the same node
     none         if the companions differ by more than a tenth of the motion, or 0.1 rad or m
 
 [Richardson 1911; Hairer, Nørsett, Wanner 1993, II.4]
@@ -24,16 +24,16 @@ from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.run.recording import Path
 
-PUSH = 4.0  # displacement of a start, in units of rounding, that shows how the motion magnifies rounding
+PUSH = 4.0  # displacement of the start, in units of rounding, to measure how the motion magnifies rounding
 ROUNDING = 4500  # units of rounding of q, or the number of steps if that is larger: the smallest meaningful difference
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
 _UNITS = 100.0  # largest error of q after ten steps, in units of rounding, that may be rounding
 _BANDS = 2.0, 8.0  # largest factor between the ratio of differences, for m = 3 and 5, and that of the method's order
 _ROWS = 2000  # largest number of times in an estimate
-_FAR_OFF = 8.0  # times the bound of the others: above, the longest step is too long for the method
-_DOUBT = 3.0  # times the estimate from the order of the method: above, shorter steps are needed
-_LOST = 0.1  # of the motion, at most 0.1 rad or m: companions that differ by more are meaningless
+_FAR_OFF = 8.0  # times the bound from the other two: larger differences only show that the longest step is too long
+_DOUBT = 3.0  # times the estimate from the order of the method; above it, shorter steps are needed
+_LOST = 0.1  # of the motion, at most 0.1 rad or m: a larger difference of companions is meaningless
 
 
 @final
@@ -44,9 +44,9 @@ class Estimated:
     Attributes:
         path: The k states at which it is compared with companion runs.
         n: Number of joints.
-        kink: Time from which the right-hand side may not be smooth, in [s]: no division by 2ᵖ − 1 after it.
+        kink: Time from which the right-hand side may not be smooth, in [s]; after it, nothing is divided by 2ᵖ − 1.
         floor: Error that rounding may leave in q, up to each state, (k,).
-        meaningless: Difference of companions that is meaningless, in [rad] or [m].
+        meaningless: Smallest meaningless difference of companions, in [rad] or [m].
     """
 
     path: Path
@@ -56,7 +56,7 @@ class Estimated:
     meaningless: float
 
     def from_longer_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
-        """Return the estimate from companions of longer steps, by step length: those of `COARSE`."""
+        """Return the estimate from companions with the longer steps of `COARSE`, by their factor on the step."""
         A, B, C = (differences(self.path, companions[pace], self.n) for pace in COARSE)
         bound = np.maximum(A, B / 2)  # nan after the end of a companion that ended early
         bound = np.fmax(bound, np.minimum(C / 4, _FAR_OFF * bound))
@@ -78,7 +78,7 @@ class Estimated:
         return self.kink > self.path.t[-1] and not result.largest <= _DOUBT * max(by_order, float(self.floor[-1]))
 
     def from_shorter_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
-        """Return the estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), p = 1 if none shows."""
+        """Return the estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), p = 1 without an order."""
         half, third = (companions[pace] for pace in FINE)
         between = at_states(self.path, third, differences(third, half, self.n))
         gaps = [differences(self.path, companion, self.n) for companion in (half, third)]
@@ -91,7 +91,7 @@ class Estimated:
         """Return the estimate of a method that chooses its steps.
 
         Args:
-            near: Differences from the companion of half as long steps, |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
+            near: Differences from the companion with steps half as long, |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
             tight: The companion at a tenth of the tolerance, or None if the right-hand side is smooth.
         """
         bound = near if tight is None else np.fmax(near, differences(self.path, tight, self.n))
@@ -131,7 +131,7 @@ class Estimated:
 
 
 def at_states(run: Path, companion: Path, values: np.ndarray) -> np.ndarray:
-    """Return values at the states of a companion for those of the run: each at the next state, nan without states."""
+    """Return values of a companion at each state of the run: at its next state, or its last; nan if it has none."""
     if not len(companion.key):  # it diverged before the first shared state
         return np.full(len(run.key), np.nan)
     return values[np.searchsorted(companion.key[:-1], run.key)]

@@ -79,9 +79,9 @@ class Observer:
         q, v, u = column[1:].reshape(3, n, 1)
         observe(self.observation, began, t, q, v, u, acted)
         self.filled += 1
-        self.look()
+        self.process()
 
-    def look(self, end: bool = False) -> None:
+    def process(self, end: bool = False) -> None:
         """Process the columns if no column is free, or at the end of the run."""
         if self.room and not (end and self.filled):
             return
@@ -91,13 +91,13 @@ class Observer:
 
     def end(self) -> None:
         """End the run: process the last columns or, if these are few, store them without the free ones."""
-        self.look(end=self.filled > _FEW)
+        self.process(end=self.filled > _FEW)
         self.columns = self.columns[:, : self.filled].copy()
 
     def close(self) -> Observed:
         """Return the observations, including the last steps; threads may call it concurrently."""
         with self._closing:
-            self.look(end=True)
+            self.process(end=True)
         return observed([self.observation], self._levels)
 
     @property

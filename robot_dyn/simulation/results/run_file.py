@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError, shorten
 from robot_dyn.foundations.files import FileKind
-from robot_dyn.foundations.store import Found, StoredFormat, StoreError
+from robot_dyn.foundations.store import Members, StoredFormat, StoreError
 from robot_dyn.simulation.results.provenance import packed
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.run.outcome import Ending
@@ -43,7 +43,7 @@ def version_remedy(about: Mapping[str, object]) -> str:
     return f"read it with the version that wrote it: {shorten(str(versions or 'unknown'))}"
 
 
-def _check(run: TrajectoryData, members: Found) -> None:
+def _check(run: TrajectoryData, members: Members) -> None:
     """Raise a StoreError if the arrays of a run are inconsistent, or their numbers cannot belong to a run."""
     if members.lengths["n"] != len(run.joint_names):
         raise StoreError(f"'q' is of {members.lengths['n']} joints, 'joint_names' of {len(run.joint_names)}")

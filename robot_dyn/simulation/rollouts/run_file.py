@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from robot_dyn.foundations.store import Found, StoredFormat, StoreError
+from robot_dyn.foundations.store import Members, StoredFormat, StoreError
 from robot_dyn.simulation.results.provenance import packed
 from robot_dyn.simulation.results.run_file import REMEDY, RUN, RunFileError, are_times, version_remedy
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
@@ -27,7 +27,7 @@ def write_rollouts(runs: RolloutsData, path: Path, overview: Overview) -> Path:
     )
 
 
-def _check(runs: RolloutsData, members: Found) -> None:
+def _check(runs: RolloutsData, members: Members) -> None:
     """Raise a StoreError if the arrays of rollouts are inconsistent, or their numbers cannot belong to runs."""
     if members.lengths.get("n", len(runs.joint_names)) != len(runs.joint_names):
         raise StoreError(f"arrays are of {members.lengths['n']} joints, 'joint_names' of {len(runs.joint_names)}")

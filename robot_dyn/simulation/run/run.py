@@ -159,7 +159,7 @@ class Run:
                 position.column[0] = observer.filled
                 ended = self.steps.advance()
                 observer.filled = int(position.column[0])
-                observer.look()
+                observer.process()
             budget -= steps
             if ended is not Ended.PAUSED or budget <= 0:
                 return ended

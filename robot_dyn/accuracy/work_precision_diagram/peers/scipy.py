@@ -47,7 +47,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
             accuracy: Any = {"rtol": max(rtol, _MIN_RTOL), "atol": 1e-2 * rtol}
             q, v, evaluations = *np.full((2, len(times), n), np.nan), None
             began = perf_counter()
-            # overflow warnings come from steps that it then rejects; ValueError from Radau, if its iteration overflows
+            # solve_ivp rejects steps that overflow; Radau raises ValueError if its iteration overflows
             with np.errstate(all="ignore"), suppress(ValueError):
                 solution: Any = solve_ivp(rate, (0.0, times[-1]), start, name, t_eval=times, **accuracy)
                 evaluations = solution.nfev
@@ -61,7 +61,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
 
 
 def _torque(motion: ArmMotion, pin: Any) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
-    """Return τ(t, q, v) of the joints, and of lines by Pinocchio's Jacobians of their points."""
+    """Return τ(t, q, v): joint torques, plus forces of line springs and dampers through Pinocchio's point Jacobians."""
     if not motion.lines:
         return motion.torque
     model: Any = motion.robot.model
@@ -91,7 +91,7 @@ def _torque(motion: ArmMotion, pin: Any) -> Callable[[float, np.ndarray, np.ndar
 
 
 def _ends(motion: ArmMotion, model: Any, line: LineSpring | LineDamper) -> Iterator[tuple[int | None, np.ndarray]]:
-    """Return frame and point of both ends; the frame is None for the world, to which the base of the arm is fixed."""
+    """Yield the frame and point of both ends of a line; the frame is None for the world, to which the base is fixed."""
     for frame, at in (line.frame, line.point), (line.other_frame, line.other_point):
         if frame is not None and not model.existFrame(frame):
             raise PeerError(f"Pinocchio has no frame {frame!r}")
