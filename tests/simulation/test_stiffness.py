@@ -77,7 +77,9 @@ def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: 
     run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False, method="DOP853")
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 1.0
-    assert re.search("of joint 'joint_2', decays at .* because of 'viscous_friction': take Rodas5P, softer", run.outcome.text)
+    assert re.search(
+        "of joint 'joint_2', decays at .* because of 'viscous_friction': take Rodas5P, softer", run.outcome.text
+    )
 
 
 def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> None:

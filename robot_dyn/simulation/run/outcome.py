@@ -82,7 +82,7 @@ class Reason(StrEnum):
     """
 
     STALLED = "stalled"
-    """Error control takes steps so short that the rest of the run would need more than 1e7 of them: the system is stiff.
+    """Error control takes steps so short that the rest of the run would need more than 1e7: the system is stiff.
 
     Take Rodas5P, softer effects or a larger tolerance.
     """
