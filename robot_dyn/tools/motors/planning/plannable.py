@@ -43,7 +43,7 @@ def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
 
 
 def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> None:
-    """Raise a PlanError for finite limits outside 1e-100 to 1e100, or if nothing limits the acceleration along the path."""
+    """Raise a PlanError for finite limits outside 1e-100 to 1e100, or if nothing limits the acceleration."""
     for name, x in (("effort", limits.effort), ("velocity", limits.velocity), ("acceleration", limits.acceleration)):
         if (wrong := np.isfinite(x) & ((x < _LEAST) | (x > _MOST))).any():
             joint, value = plant.dynamics.joint_names[int(wrong.argmax())], x[wrong][0]
