@@ -145,6 +145,7 @@ class Advice(Answer):
         if not self.period_s:
             return
         limit, unstable = self.longest_period_s, self.at_period is Stability.UNSTABLE
+        marginal = self.at_period is Stability.MARGINAL
         if unstable and not limit:
             verdict = f"; no period is stable: use {remedy(self.grows_anyway)}"
         elif unstable:
@@ -153,8 +154,12 @@ class Advice(Answer):
             verdict = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
         else:
             verdict = f"; the loop is stable up to {limit:.3g} s" if isfinite(limit) else "; every period is stable"
-        marginal = ", some deviations neither decay nor grow" * (self.at_period is Stability.MARGINAL)
-        yield f"control period {self.period_s:.3g} s: {self.at_period}{marginal}{verdict}"
+        if marginal and self.period_s <= limit:
+            verdict = (
+                f"; none grows up to a period of {limit:.3g} s" if isfinite(limit) else "; none grows at any period"
+            )
+        cause = ", some deviations neither decay nor grow, for example of a joint held by dry friction" * marginal
+        yield f"control period {self.period_s:.3g} s: {self.at_period}{cause}{verdict}"
 
     def _of_growth(self) -> Iterator[str]:
         if not self.stable:

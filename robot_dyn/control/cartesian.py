@@ -7,17 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import pi
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
 from robot_dyn.foundations.arithmetic import Array, Scalar
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, OptionalCoefficientField, coefficient, default
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.spatial import rotation as rotation_about
 from robot_dyn.foundations.validate import duration
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _MOST_TURNS = 1000
 _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp, for the accuracy stated in `circle`
@@ -36,8 +40,12 @@ class CartesianReference(Reference):
     """
 
     position: PiecewisePolynomial
-    rotation: Any = field(default=None, metadata=coefficient(shapes=((3, 3),), can_vary=False))
-    axis: Any = field(default=(0.0, 0.0, 1.0), metadata=coefficient(shapes=((3,),), can_vary=False))
+    rotation: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient(shapes=((3, 3),), can_vary=False)
+    )
+    axis: CoefficientField = field(
+        default=default((0.0, 0.0, 1.0)), metadata=coefficient(shapes=((3,),), can_vary=False)
+    )
     angle: PiecewisePolynomial | None = None
 
     def __post_init__(self) -> None:
@@ -78,7 +86,13 @@ class CartesianReference(Reference):
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def line(
-    p0: Any, p1: Any, duration_s: float, *, rotation: Any = None, rotation_end: Any = None, start_s: float = 0.0
+    p0: ArrayLike,
+    p1: ArrayLike,
+    duration_s: float,
+    *,
+    rotation: ArrayLike | None = None,
+    rotation_end: ArrayLike | None = None,
+    start_s: float = 0.0,
 ) -> CartesianReference:
     """Return the straight line from p0 to p1 and the shortest turn between two orientations, as minimum-jerk motions.
 
@@ -110,15 +124,15 @@ def line(
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def circle(
-    centre: Any,
+    centre: ArrayLike,
     radius: float,
-    normal: Any,
+    normal: ArrayLike,
     period_s: float,
     *,
     turns: float = 1.0,
     ramp_s: float | None = None,
-    toward: Any = None,
-    rotation: Any = None,
+    toward: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
     start_s: float = 0.0,
 ) -> CartesianReference:
     """Return a circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
@@ -152,8 +166,8 @@ def circle(
     rise = number("ramp_s", min(T / 4, turns * T) if ramp_s is None else ramp_s, least=0)
     if rise > turns * T:
         raise ControlError(f"ramp_s must be at most turns · period_s = {turns * T} s, got {rise} s")
-    toward = np.eye(3)[np.argmin(np.abs(normal))] if toward is None else numbers("toward", toward, (3,))
-    x = _direction("toward, in the plane of the circle,", toward - (toward @ normal) * normal)
+    start = np.eye(3)[np.argmin(np.abs(normal))] if toward is None else numbers("toward", toward, (3,))
+    x = _direction("toward, in the plane of the circle,", start - (start @ normal) * normal)
     y = np.cross(normal, x)
     angle = _ramped_angle(2 * pi / T, turns * T, rise)
     knots = _knots(angle, T, rise)
@@ -188,7 +202,7 @@ def _knots(angle: PiecewisePolynomial, period: float, rise: float) -> np.ndarray
 
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
-def _rotation(name: str, values: Any) -> np.ndarray:
+def _rotation(name: str, values: ArrayLike) -> np.ndarray:
     """Return a rotation matrix, read-only; raise a ControlError if RᵀR is not 1 to 1e-8 or det R is not positive."""
     R = numbers(name, values, (3, 3))
     if not np.abs(R.T @ R - np.eye(3)).max() <= 1e-8 or np.linalg.det(R) < 0:
@@ -196,7 +210,7 @@ def _rotation(name: str, values: Any) -> np.ndarray:
     return R
 
 
-def _direction(name: str, values: Any) -> np.ndarray:
+def _direction(name: str, values: ArrayLike) -> np.ndarray:
     """Return a unit vector, (3,), read-only; raise a ControlError if it is zero."""
     vector = numbers(name, values, (3,))
     largest = np.abs(vector).max()  # used as a scale, so that no square overflows

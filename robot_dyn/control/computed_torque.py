@@ -7,7 +7,7 @@ If the model differs from the arm, M, C and N do not cancel, and the difference 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, final
+from typing import final
 
 from numpy.typing import ArrayLike
 
@@ -15,7 +15,7 @@ from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.independent_joint import DAMPING, STIFFNESS, gains_from, joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient
 from robot_dyn.foundations.errors import ControlError
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
@@ -39,8 +39,8 @@ class ModelBased(Stateless):
     model: Dynamics
     reference: PiecewisePolynomial
     _: KW_ONLY
-    kp: Any = field(metadata=STIFFNESS)
-    kd: Any = field(metadata=DAMPING)
+    kp: CoefficientField = field(metadata=STIFFNESS)
+    kd: CoefficientField = field(metadata=DAMPING)
     period_s: float = 0.0
 
     thresholds = smooth
@@ -86,8 +86,8 @@ class ComputedTorque(ModelBased):
     Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
     """
 
-    kp: Any = field(kw_only=True, metadata=coefficient("1/s²", symbol="kp", least=0))
-    kd: Any = field(kw_only=True, metadata=coefficient("1/s", symbol="kd", least=0))
+    kp: CoefficientField = field(kw_only=True, metadata=coefficient("1/s²", symbol="kp", least=0))
+    kd: CoefficientField = field(kw_only=True, metadata=coefficient("1/s", symbol="kd", least=0))
 
     term = "M̂ (a_d + kd ė + kp e) + Ĉ v + N̂"
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
-from typing import Any, ClassVar, NamedTuple, final
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.foundations.validate import duration
 from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from robot_dyn.control.digital_loop.block import Block
 
 
 class Nested(NamedTuple):
@@ -37,7 +40,7 @@ class Nested(NamedTuple):
 
     path: str
     label: str
-    part: Any
+    part: Controller | Block
 
 
 class Controller(Value, ABC):
@@ -254,13 +257,13 @@ class Stateless(Controller):
         return z
 
 
-def check_model(model: Any) -> None:
+def check_model(model: object) -> None:
     """Raise a ControlError unless the model is the dynamics of an arm."""
     if not isinstance(model, Dynamics):
         raise ControlError(f"model must be a robot, such as rd.load('ur5'), got {shown(model)}")
 
 
-def check_joints(part: Any, n: int, where: str = "") -> None:
+def check_joints(part: object, n: int, where: str = "") -> None:
     """Raise a ControlError if a coefficient of joints is neither one number nor one number for each of n joints."""
     for name, declared_as in declared(type(part)).items():
         shape = np.shape(getattr(part, name))
@@ -268,7 +271,7 @@ def check_joints(part: Any, n: int, where: str = "") -> None:
             raise ControlError(f"{where}{name} must be one number or of shape ({n},), got {shape}")
 
 
-def check_sampled(name: str, controller: Any) -> None:
+def check_sampled(name: str, controller: object) -> None:
     """Raise a ControlError unless the controller is sampled and may be nested."""
     if not isinstance(controller, Controller):
         raise ControlError(
@@ -305,7 +308,7 @@ class ControlLaw(Stateless):
         ControlError: If the function does not take three arguments.
     """
 
-    function: Callable[[float, Array, Array], Any]
+    function: Callable[[float, Array, Array], object]
     joints: int
 
     def __post_init__(self) -> None:

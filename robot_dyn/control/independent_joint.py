@@ -7,17 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from robot_dyn.control.controller import Controller, Stateless
 from robot_dyn.control.reference import PiecewisePolynomial, numbers
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.coefficients import (
+    CoefficientField,
+    OptionalCoefficientField,
+    coefficient,
+    default,
+    with_values,
+)
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
 from robot_dyn.foundations.threshold import Threshold, smooth
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 STIFFNESS = coefficient("N m/rad", symbol="kp", least=0)
 DAMPING = coefficient("N m s/rad", symbol="kd", least=0)
@@ -37,8 +47,8 @@ class PD(Stateless):
 
     reference: PiecewisePolynomial
     _: KW_ONLY
-    kp: Any = field(metadata=STIFFNESS)
-    kd: Any = field(metadata=DAMPING)
+    kp: CoefficientField = field(metadata=STIFFNESS)
+    kd: CoefficientField = field(metadata=DAMPING)
     period_s: float = 0.0
 
     term = "kp (q_d − q) + kd (v_d − v)"
@@ -81,13 +91,17 @@ class PID(Controller):
 
     reference: PiecewisePolynomial
     _: KW_ONLY
-    kp: Any = field(metadata=STIFFNESS)
-    ki: Any = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
-    kd: Any = field(metadata=DAMPING)
-    effort_limit: Any = field(default=np.inf, metadata=coefficient("N m", above=0, infinite=True))
-    tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, can_vary=False))
+    kp: CoefficientField = field(metadata=STIFFNESS)
+    ki: CoefficientField = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
+    kd: CoefficientField = field(metadata=DAMPING)
+    effort_limit: CoefficientField = field(default=default(np.inf), metadata=coefficient("N m", above=0, infinite=True))
+    tracking_time_s: float | None = field(
+        default=None, metadata=coefficient("s", shapes=((),), above=0, can_vary=False)
+    )
     period_s: float = 0.0
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
+    _middle: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient("N m", can_vary=False)
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -140,7 +154,9 @@ class PID(Controller):
         return saturated(u, self.effort_limit, self._middle)
 
 
-def gains_from(inertia_diagonal: Any, bandwidth_rad_s: Any, damping_ratio: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def gains_from(
+    inertia_diagonal: ArrayLike, bandwidth_rad_s: ArrayLike, damping_ratio: ArrayLike = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Compute gains for the closed loop ë + 2 ζ ω ė + ω² e = 0 of a joint: kp = M_ii ω², kd = 2 ζ ω M_ii.
 
     For computed torque, which cancels the inertia, pass inertia 1.
@@ -166,7 +182,7 @@ def gains_from(inertia_diagonal: Any, bandwidth_rad_s: Any, damping_ratio: Any =
     return numbers("kp = M_ii ω²", kp, (), ("n",)), numbers("kd = 2 ζ ω M_ii", kd, (), ("n",))
 
 
-def joint_count(reference: Any) -> int:
+def joint_count(reference: object) -> int:
     """Return the number of joints of a joint reference; raise a ControlError for other values."""
     if not isinstance(reference, PiecewisePolynomial):
         raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {shown(reference)}")

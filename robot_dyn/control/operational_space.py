@@ -20,7 +20,7 @@ from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import number, numbers
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.arithmetic import Array, apply, symmetric, transpose
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, OptionalCoefficientField, coefficient, default
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.linear_algebra import eigh
 from robot_dyn.foundations.threshold import smooth
@@ -155,13 +155,13 @@ class OperationalSpace(Stateless):
     frame: str
     reference: CartesianReference
     _: KW_ONLY
-    kp: Any = field(metadata=coefficient("1/s²", shapes=((), ("m",)), least=0))
-    kd: Any = field(metadata=coefficient("1/s", shapes=((), ("m",)), least=0))
-    posture: Any = field(default=None, metadata=coefficient("rad", shapes=(("n",),)))
-    posture_kp: Any = field(default=0.0, metadata=coefficient("1/s²", least=0))
-    posture_kd: Any = field(default=0.0, metadata=coefficient("1/s", least=0))
+    kp: CoefficientField = field(metadata=coefficient("1/s²", shapes=((), ("m",)), least=0))
+    kd: CoefficientField = field(metadata=coefficient("1/s", shapes=((), ("m",)), least=0))
+    posture: OptionalCoefficientField = field(default=default(None), metadata=coefficient("rad", shapes=(("n",),)))
+    posture_kp: CoefficientField = field(default=default(0.0), metadata=coefficient("1/s²", least=0))
+    posture_kd: CoefficientField = field(default=default(0.0), metadata=coefficient("1/s", least=0))
     rows: Any = None
-    threshold: Any = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), above=0))
+    threshold: float = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), above=0))
     period_s: float = 0.0
 
     term = "Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture"

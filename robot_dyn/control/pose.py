@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -26,6 +26,10 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes
 from robot_dyn.queries.units import of_joint
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _SOUGHT = 1e-11  # largest ‖e‖ of a descent, in [m] and [rad]: below usual tolerances, above rounding
 _ROTATION = 1e-6  # largest entry of RᵀR − 1 for a rotation
@@ -99,10 +103,10 @@ class InverseKinematics(Answer, Value):
 
 def inverse_kinematics(
     arm: Robot,
-    pose: Any,
+    pose: ArrayLike | tuple[ArrayLike, ArrayLike | None],
     *,
     frame: str,
-    q0: Any = None,
+    q0: ArrayLike | None = None,
     seed: int = 0,
     starts: int = 20,
     tolerance: float = 1e-9,

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
 from math import factorial, isfinite, perm
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +18,11 @@ from robot_dyn.foundations import validate
 from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.errors import ControlError, QueryError, shown
 from robot_dyn.foundations.validate import choice, duration, times
-from robot_dyn.foundations.values import Value
+from robot_dyn.foundations.values import ArrayField, Value
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 # number of prescribed values at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}
@@ -56,8 +60,8 @@ class PiecewisePolynomial(Reference):
         coefficients: cᵢⱼ of (t − tᵢ)ʲ, shape (k, d + 1, n), in [rad/sʲ] or [m/sʲ].
     """
 
-    breaks: Any
-    coefficients: Any
+    breaks: ArrayField
+    coefficients: ArrayField
 
     def __post_init__(self) -> None:
         table = numbers("coefficients", self.coefficients, ("k", "d + 1", "n"))
@@ -129,22 +133,22 @@ def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
     return q, v, 2 * a
 
 
-def hold(q: Any) -> PiecewisePolynomial:
+def hold(q: ArrayLike) -> PiecewisePolynomial:
     """Return a reference at rest at q, shape (n,); raise a ControlError for other shapes."""
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def quintic(
-    q0: Any,
-    q1: Any,
+    q0: ArrayLike,
+    q1: ArrayLike,
     duration_s: float,
     *,
     start_s: float = 0.0,
-    v0: Any = 0.0,
-    v1: Any = 0.0,
-    a0: Any = 0.0,
-    a1: Any = 0.0,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+    a0: ArrayLike = 0.0,
+    a1: ArrayLike = 0.0,
 ) -> PiecewisePolynomial:
     """Return the quintic from q0 to q1.
 
@@ -178,7 +182,7 @@ def quintic(
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def via_points(
-    times_s: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0
+    times_s: ArrayLike, points: ArrayLike, *, kind: str = "quintic", v0: ArrayLike = 0.0, v1: ArrayLike = 0.0
 ) -> PiecewisePolynomial:
     """Return the spline through points at prescribed times, from rest to rest unless end velocities are passed.
 
@@ -256,7 +260,7 @@ def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndar
     return data
 
 
-def increasing(name: str, values: Any, count: int) -> np.ndarray:
+def increasing(name: str, values: ArrayLike, count: int) -> np.ndarray:
     """Return increasing times as a read-only array, (count,); raise a ControlError if they do not increase."""
     times = numbers(name, values, (count,))
     if not (np.diff(times) > 0).all():

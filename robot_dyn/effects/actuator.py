@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.effects.effect import Bound, Effect, Stateful
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import URDF, coefficient, with_values
+from robot_dyn.foundations.coefficients import (
+    URDF,
+    CoefficientField,
+    OptionalCoefficientField,
+    coefficient,
+    default,
+    with_values,
+)
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
 from robot_dyn.foundations.threshold import Threshold, smooth
@@ -33,11 +40,13 @@ class EffortLimit(Bound):
         >>> rd.effects.EffortLimit(limit=[3.0, 2.0])
     """
 
-    limit: Any = field(
+    limit: CoefficientField = field(
         metadata=coefficient("N m", symbol="u_max", least=0, infinite=True, elsewhere=inf, stated="effort_limit")
     )
 
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
+    _middle: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient("N m", can_vary=False)
+    )
 
     term = "|u| ≤ u_max"
     largest = property(attrgetter("limit"))  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -53,7 +62,7 @@ class EffortLimit(Bound):
         limit, middle = piece(self.limit, n, sides)
         return with_values(self, {"limit": limit, "_middle": middle})
 
-    def on(self, dynamics: Any) -> Effect:
+    def on(self, dynamics: Dynamics) -> Effect:
         resolved = super().on(dynamics)
         if self.limit is URDF:
             stated_efforts(dynamics)  # raises for limits of 0
@@ -77,7 +86,7 @@ class ActuatorLag(Stateful, Bound):
         >>> rd.effects.ActuatorLag(time_constant_s=[0.02, 0.05])
     """
 
-    time_constant_s: Any = field(metadata=coefficient("s", symbol="T", above=0))
+    time_constant_s: CoefficientField = field(metadata=coefficient("s", symbol="T", above=0))
 
     term = "u' = (u_command − u) / T"
     thresholds = smooth
@@ -94,12 +103,13 @@ class ActuatorLag(Stateful, Bound):
         return z
 
 
-def stated_efforts(robot: Any) -> np.ndarray:
+def stated_efforts(dynamics: Dynamics) -> np.ndarray:
     """Return the effort limits in the file of a robot, (n,), inf for none, in [N m] or [N].
 
     Raises:
         EffectError: If one is 0, which files use for an unknown limit: the joint would have no actuation.
     """
+    robot: Any = dynamics
     if names := [name for name, limit in zip(robot.joint_names, robot.effort_limit, strict=True) if limit == 0]:
         listed = ", ".join(map(repr, names[:6])) + (", …" if len(names) > 6 else "")
         raise EffectError(

@@ -12,13 +12,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 from robot_dyn.description.edits import Payload
 from robot_dyn.effects.effect import Timed
 from robot_dyn.foundations.coefficients import coefficient
 from robot_dyn.foundations.errors import EditError, EffectError
 from robot_dyn.foundations.validate import instance, truth
+from robot_dyn.queries.dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from robot_dyn.model.robot import Robot
+
 
 _START = coefficient("s", shapes=((),), can_vary=False)
 _END = coefficient("s", shapes=((),), infinite=True, can_vary=False)
@@ -56,19 +61,20 @@ class CarriedPayload(Timed):
         truth("at_rest", self.at_rest, error=EffectError)
         super().__post_init__()
 
-    def on(self, dynamics: Any) -> CarriedPayload:
+    def on(self, dynamics: Dynamics) -> CarriedPayload:
         if self.carried is None:
             robot_with(dynamics, [self], [True])  # reports an unknown link now, not during a run
         return self
 
 
-def robot_with(dynamics: Any, effects: Sequence[CarriedPayload], carried: Sequence[bool]) -> Any:
+def robot_with(dynamics: Dynamics, effects: Sequence[CarriedPayload], carried: Sequence[bool]) -> Robot:
     """Return the robot with all these payloads, massless where they are not carried.
 
     Raises:
         EffectError: If the dynamics are not a robot, or the link is unknown.
     """
-    if not hasattr(dynamics, "with_"):
+    with_ = getattr(dynamics, "with_", None)
+    if with_ is None:
         raise EffectError(f"carried_payload: needs a Robot, got {type(dynamics).__name__}; give rd.Plant(robot, …)")
     massless = ((0.0, 0.0, 0.0),) * 3
     bodies = [
@@ -76,6 +82,6 @@ def robot_with(dynamics: Any, effects: Sequence[CarriedPayload], carried: Sequen
         for effect, is_carried in zip(effects, carried, strict=True)
     ]
     try:
-        return dynamics.with_(payload=bodies)
+        return with_(payload=bodies)
     except EditError as error:
         raise EffectError(f"carried_payload: {error}") from None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -22,6 +22,10 @@ from robot_dyn.foundations.validate import rows
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit, without_rounding
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 OF_BODIES = "inertia", "Coriolis", "gravity"
 _ROUNDING = 1e-12  # relative to the terms; a torque at its bound may exceed it by this much
@@ -67,7 +71,7 @@ class Causes(Answer, Value):
         yield Table(("joint", "t [s]", "unit", "torque", *names), tuple(out))
 
 
-def torques_by_cause(plant: Plant | Dynamics, t: Any, q: Any, v: Any, a: Any) -> Causes:
+def torques_by_cause(plant: Plant | Dynamics, t: ArrayLike, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Causes:
     """Compute the torque that a motion needs, by cause; for a run, use `run.causes()`.
 
     Dry friction is 0 on a joint whose velocity is exactly 0, as in `Plant.inverse_dynamics`: the torque that holds the
@@ -153,7 +157,7 @@ def exerted_torques(
     bare = _inverse_dynamics(plant.dynamics, q, v, a)
     for j, name in enumerate(names[len(forces) :]):
         rows_carried, alone = carried[:, j], [i == j for i in range(len(payloads))]
-        loaded: Any = robot_with(plant.dynamics, payloads, alone)
+        loaded = robot_with(plant.dynamics, payloads, alone)
         with_payload = _inverse_dynamics(loaded, q[rows_carried], v[rows_carried], a[rows_carried])
         exerted[name][rows_carried] = bare[rows_carried] - with_payload
     if tau is not None:
@@ -205,7 +209,9 @@ def _bounds(force: SetValued, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return least, most
 
 
-def motion(n: int, t: Any, q: Any, v: Any, a: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def motion(
+    n: int, t: ArrayLike, q: ArrayLike, v: ArrayLike, a: ArrayLike
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Check times (k,) and a motion (k, n), and return them as arrays."""
     t = rows("t", t)
     arrays = [rows(name, x, n) for name, x in (("q", q), ("v", v), ("a", a))]

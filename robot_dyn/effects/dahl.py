@@ -9,14 +9,14 @@ follows the other branch of the hysteresis. F depends on the path, not on time. 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.lugre import Bristles
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, OptionalCoefficientField, coefficient, default
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -41,9 +41,11 @@ class DahlFriction(Bristles, Dissipative):
         >>> rd.effects.DahlFriction(bristle_stiffness=300.0, coulomb=[0.7, 1.0], exponent=1.5)
     """
 
-    bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ", least=0))
-    coulomb: Any = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
-    exponent: Any = field(default=None, metadata=coefficient(symbol="α", least=1, elsewhere=1.0))
+    bristle_stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="σ", least=0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
+    exponent: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient(symbol="α", least=1, elsewhere=1.0)
+    )
 
     term = "−σ z, z' = |w|^α sign(w) v, w = 1 − (σ z/f_c) sign(v)"
 

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import require
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
-from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.arithmetic import Array, Scalar
+from robot_dyn.foundations.coefficients import (
+    CoefficientField,
+    OptionalCoefficientField,
+    coefficient,
+    default,
+    with_values,
+)
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -40,12 +46,18 @@ class DryFriction(SetValued):
         >>> rd.effects.DryFriction(coulomb=[0.4, 0.2], static=0.6, stribeck_velocity=0.1)
     """
 
-    coulomb: Any = field(metadata=coefficient("N m", symbol="f_c", least=0, stated="friction"))
-    static: Any = field(default=None, metadata=coefficient("N m", symbol="f_s", least=0))
-    stribeck_velocity: Any = field(default=None, metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", least=0, stated="friction"))
+    static: OptionalCoefficientField = field(default=default(None), metadata=coefficient("N m", symbol="f_s", least=0))
+    stribeck_velocity: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0)
+    )
 
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
-    _direction: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    held: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
+    _direction: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
 
     rubs = True
     term = "−f(v) sign(v); |τ| ≤ f_s at v = 0"
@@ -57,7 +69,7 @@ class DryFriction(SetValued):
         require("static must not be less than coulomb", np.greater_equal, self.static, self.coulomb)
 
     @property
-    def widths(self) -> tuple[Any, Any]:
+    def widths(self) -> tuple[Scalar, Scalar]:
         if self.static is None or self.stribeck_velocity is None:
             return inf, inf
         return inf, np.where(np.greater(self.static, self.coulomb), self.stribeck_velocity, inf)
@@ -76,7 +88,7 @@ class DryFriction(SetValued):
         return np.where(np.abs(v) > 0, self.sliding(v), self._static + 0 * v)
 
     @property
-    def _static(self) -> Any:
+    def _static(self) -> Array:
         """The load at which a joint starts to slide, f_s."""
         return self.coulomb if self.static is None else self.static
 

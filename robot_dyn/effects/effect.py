@@ -12,17 +12,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from math import inf
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import check_coefficients, declared
 from robot_dyn.foundations.errors import EffectError, QueryError
 from robot_dyn.foundations.threshold import Layer, Threshold, smooth
 from robot_dyn.foundations.validate import rows
 from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class _ClassName:
@@ -60,7 +63,7 @@ class Effect(Value):
     def __post_init__(self) -> None:
         check_coefficients(self, EffectError, resolved=True)
 
-    def on(self, dynamics: Any) -> Effect:
+    def on(self, dynamics: Dynamics) -> Effect:
         """Return this effect with coefficients given by joint name or as "urdf" replaced by arrays (n,).
 
         Raises:
@@ -98,7 +101,7 @@ class Effect(Value):
         return self
 
     @property
-    def widths(self) -> tuple[Any, Any]:
+    def widths(self) -> tuple[Scalar, Scalar]:
         """Changes in q and in v over which the torque bends, each a scalar or (n,); inf where it is smooth.
 
         Implicit methods compute the Jacobian from differences within these changes. The change in v is also the width
@@ -278,13 +281,13 @@ class Timed(Effect):
     def switches(self) -> tuple[float, ...]:
         return self.start_s, self.end_s
 
-    def acts(self, t: Any) -> Array:
+    def acts(self, t: ArrayLike) -> Array:
         """Return True at times t, (...,), at which the effect acts, including `start_s` but not `end_s`."""
         t = rows("t", t)
         return (self.start_s <= t) & (t < self.end_s)
 
 
-def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
+def require(message: str, relation: Callable[..., ArrayLike], *values: object) -> None:
     """Raise an EffectError unless coefficients satisfy a relation for every joint.
 
     Values by joint name or "urdf", and mismatched numbers of joints, are checked later, when a plant is built.
@@ -299,7 +302,7 @@ def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
         raise EffectError(f"{message}, got {' and '.join(map(str, values))}")
 
 
-def check_frame(effect: Effect, dynamics: Any, frame: str) -> None:
+def check_frame(effect: Effect, dynamics: Dynamics, frame: str) -> None:
     """Raise an EffectError if the arm has no such frame."""
     try:
         dynamics.placement(np.zeros(dynamics.n), frame)

@@ -207,15 +207,15 @@ class EquationOfMotion:
         else:
             free = 1 - held
             if any(drive.coupled for drive in self.drives.values()):
-                M = M + self._added_inertia()
+                M = M + self._added_inertia(held)
             alone = M * (free[:, None] * free[None, :]) + held * np.eye(len(load))
             a = acceleration(alone, free * load, self.dynamics.joint_names)
         return a, held * (M @ a - load)
 
-    def _added_inertia(self) -> Array:
+    def _added_inertia(self, held: Array) -> Array:
         """Return the inertia of motors that move with their joints, (n, n)."""
         n = self.dynamics.n
-        added = 0 * self.set_valued[0].held
+        added = 0 * held
         for drive in self.drives.values():
             if drive.coupled:
                 added[list(drive.driven(n))] = drive.added_inertia(n)

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from robot_dyn.description.catalog import abbreviated
+from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect, Force
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.model.findings import reservations
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_texts, joint_types_of
 
 EDITED = {
@@ -109,9 +111,9 @@ class Explanation(Answer):
             yield from (f"  {finding}" for finding in self.findings)
 
 
-def explanation(dynamics: Any, effects: tuple[Effect, ...]) -> Explanation:
+def explanation(dynamics: Dynamics, effects: tuple[Effect, ...]) -> Explanation:
     """Return the equation of motion of dynamics with effects."""
-    robot = getattr(dynamics, "robot", dynamics)
+    robot: Any = getattr(dynamics, "robot", dynamics)
     edits = tuple(edit_terms(robot.edits)) if hasattr(robot, "edits") else ()
     weight = ["∂V/∂q"] if not hasattr(robot, "edits") or any(robot.edits.gravity) else []
     forces = dict.fromkeys(force.name for force in effects if isinstance(force, Force))
@@ -147,24 +149,24 @@ def _by_effect(effects: Iterable[Effect]) -> Iterator[list[Effect]]:
         yield parts
 
 
-def _term(parts: list[Effect], dynamics: Any) -> Term:
+def _term(parts: list[Effect], dynamics: Dynamics) -> Term:
     return Term(parts[0].name, term_of(parts), coefficients=as_they_act(parts, dynamics))
 
 
-def term_of(parts: Iterable[Any]) -> str:
+def term_of(parts: Iterable[Effect | type[Effect]]) -> str:
     """Return the sum of the terms of an effect's parts, or of their classes."""
     first, *rest = (part.term for part in parts)
     return " ".join((first, *(f"− {term[1:]}" if term[:1] == "−" else f"+ {term}" for term in rest)))
 
 
-def as_they_act(parts: Iterable[Any], dynamics: Any, signal: str = "signal") -> tuple[str, ...]:
+def as_they_act(parts: Iterable[object], dynamics: Dynamics, signal: str = "signal") -> tuple[str, ...]:
     """Return the coefficients of the parts of an effect or a controller, with units; see `coefficient_texts`."""
     types = joint_types_of(dynamics)
     texts = {name: text for part in parts for name, text in coefficient_texts(part, types, signal).items()}
     return tuple(texts.values())
 
 
-def edit_terms(edits: Any) -> Iterator[Term]:
+def edit_terms(edits: Edits) -> Iterator[Term]:
     """Yield a term for each edit of a robot, gravity included."""
     texts = {
         "gravity": [f"g = ({', '.join(f'{x:g}' for x in edits.gravity)}) m/s²"] if any(edits.gravity) else [],

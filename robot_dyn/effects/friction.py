@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Dissipative
-from robot_dyn.foundations.arithmetic import Array, tanh
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.arithmetic import Array, Scalar, tanh
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient, default
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -27,7 +27,7 @@ class ViscousFriction(Dissipative):
         >>> rd.effects.ViscousFriction(viscous=[0.3, 0.1])
     """
 
-    viscous: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+    viscous: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
     term = "−b v"
     thresholds = smooth
@@ -51,14 +51,16 @@ class RegularisedCoulombFriction(Dissipative):
         >>> rd.effects.RegularisedCoulombFriction(coulomb=0.2, velocity_scale=[0.05, 0.1])
     """
 
-    coulomb: Any = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))
-    velocity_scale: Any = field(default=0.01, metadata=coefficient("rad/s", symbol="v_s", above=0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))
+    velocity_scale: CoefficientField = field(
+        default=default(0.01), metadata=coefficient("rad/s", symbol="v_s", above=0)
+    )
 
     term = "−f tanh(v / v_s)"
     thresholds = smooth
 
     @property
-    def widths(self) -> tuple[Any, Any]:
+    def widths(self) -> tuple[Scalar, Scalar]:
         return inf, np.where(np.asarray(self.coulomb) > 0, self.velocity_scale, inf)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from robot_dyn.effects.effect import Drive
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.coefficients import CoefficientField, OptionalCoefficientField, with_values
 from robot_dyn.foundations.errors import EffectError
+from robot_dyn.queries.dynamics import Dynamics
 
 
 class GearedMotor(Drive):
@@ -23,12 +24,12 @@ class GearedMotor(Drive):
         through: Name of the coefficient that couples a motor to its joint.
     """
 
-    inertia: Any
-    ratio: Any
+    inertia: CoefficientField
+    ratio: OptionalCoefficientField
     joints: tuple[int, ...] | None
     through: ClassVar[str]
 
-    def on(self, dynamics: Any) -> Any:
+    def on(self, dynamics: Dynamics) -> Self:
         resolved: Any = super().on(dynamics)
         driven = np.flatnonzero(np.broadcast_to(getattr(resolved, self.through), dynamics.n) > 0)
         if not len(driven):

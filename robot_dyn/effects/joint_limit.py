@@ -9,16 +9,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, ClassVar, final
+from typing import TYPE_CHECKING, ClassVar, final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Conservative, Dissipative, Effect, require
-from robot_dyn.foundations.arithmetic import Array, positive_part
-from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.arithmetic import Array, Scalar, positive_part
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient, with_values
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from robot_dyn.foundations.coefficients import CoefficientInput
+
 
 _NOWHERE = 1e9  # position of a stop that does not exist
 _LOWER_STOP, _UPPER_STOP = ("lower stop", "left", "touched"), ("upper stop", "touched", "left")
@@ -30,8 +34,8 @@ UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, st
 class _JointStops(Effect):
     """Base class of the two parts of joint stops."""
 
-    lower: Any = field(metadata=LOWER)
-    upper: Any = field(metadata=UPPER)
+    lower: CoefficientField = field(metadata=LOWER)
+    upper: CoefficientField = field(metadata=UPPER)
 
     name = "joint_stops"
     through: ClassVar[str]  # the coefficient that acts: a joint where it is 0 has no stops
@@ -52,7 +56,7 @@ class _JointStops(Effect):
         require("lower must be less than upper", np.less, lower, upper)
 
     @property
-    def widths(self) -> tuple[Any, Any]:
+    def widths(self) -> tuple[Scalar, Scalar]:
         with np.errstate(divide="ignore"):  # depth at 1 N m or 1 N: relevant loads lie deeper
             return np.divide(1.0, getattr(self, self.through)), inf
 
@@ -90,7 +94,7 @@ class JointStopSpring(_JointStops, Conservative):
         >>> rd.effects.JointStopSpring(lower=[-1.0, -2.0], upper=1.0, stiffness=50.0)
     """
 
-    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
+    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0))
 
     through = "stiffness"
     term = "k (δ₋ − δ₊)"
@@ -117,7 +121,9 @@ class JointStopDamper(_JointStops, Dissipative):
         >>> rd.effects.JointStopDamper(lower=[-1.0, -2.0], upper=1.0, damping=20.0)
     """
 
-    damping: Any = field(metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0))
+    damping: CoefficientField = field(
+        metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0)
+    )
 
     through = "damping"
     term = "−c (δ₋ + δ₊) v"
@@ -127,7 +133,7 @@ class JointStopDamper(_JointStops, Dissipative):
 
 
 def joint_stops(
-    lower: Any, upper: Any, stiffness: Any = 1e4, damping: Any = 1e3
+    lower: CoefficientInput, upper: CoefficientInput, stiffness: CoefficientInput = 1e4, damping: CoefficientInput = 1e3
 ) -> tuple[JointStopSpring, JointStopDamper]:
     """Return both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`.
 

@@ -8,13 +8,13 @@ Jacobians of the points, ∂ℓ/∂q = eᵀ (J − J') and ℓ' = ∂ℓ/∂q v.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Conservative, Dissipative, Effect, check_frame
 from robot_dyn.foundations.arithmetic import Array, apply, sqrt, transpose
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient, default
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.spatial import hat
 from robot_dyn.foundations.threshold import smooth
@@ -34,8 +34,8 @@ class _Line(Effect):
 
     frame: str
     other_frame: str | None
-    point: Any = field(default=(0.0, 0.0, 0.0), metadata=_POINT)
-    other_point: Any = field(default=(0.0, 0.0, 0.0), metadata=_OTHER)
+    point: CoefficientField = field(default=default((0.0, 0.0, 0.0)), metadata=_POINT)
+    other_point: CoefficientField = field(default=default((0.0, 0.0, 0.0)), metadata=_OTHER)
 
     name = "line_spring_damper"
     thresholds = smooth
@@ -53,7 +53,7 @@ class _Line(Effect):
     def _frames(self) -> tuple[str, ...]:
         return (self.frame,) if self.other_frame is None else (self.frame, self.other_frame)
 
-    def on(self, dynamics: Any) -> Effect:
+    def on(self, dynamics: Dynamics) -> Effect:
         for frame in self._frames:
             check_frame(self, dynamics, frame)
         return self
@@ -108,8 +108,8 @@ class LineSpring(_Line, Conservative):
         ...     other_point=[0.0, 0.0, 0.4], stiffness=30.0, length=0.7)
     """
 
-    stiffness: Any = field(kw_only=True, metadata=_STIFFNESS)
-    length: Any = field(kw_only=True, metadata=_LENGTH)
+    stiffness: float = field(kw_only=True, metadata=_STIFFNESS)
+    length: float = field(kw_only=True, metadata=_LENGTH)
 
     term = "−(∂ℓ/∂q)ᵀ k (ℓ − ℓ₀)"
 
@@ -135,7 +135,7 @@ class LineDamper(_Line, Dissipative):
         ...     other_point=[0.0, 0.0, 0.4], damping=2.0)
     """
 
-    damping: Any = field(kw_only=True, metadata=_DAMPING)
+    damping: float = field(kw_only=True, metadata=_DAMPING)
 
     term = "−(∂ℓ/∂q)ᵀ c ℓ'"
 
@@ -166,9 +166,9 @@ class LineSpringDamper(_Line):
         ...     other_point=[0.0, 0.0, 0.4], stiffness=30.0, damping=2.0, length=0.7)
     """
 
-    stiffness: Any = field(kw_only=True, metadata=_STIFFNESS)
-    damping: Any = field(kw_only=True, metadata=_DAMPING)
-    length: Any = field(kw_only=True, metadata=_LENGTH)
+    stiffness: float = field(kw_only=True, metadata=_STIFFNESS)
+    damping: float = field(kw_only=True, metadata=_DAMPING)
+    length: float = field(kw_only=True, metadata=_LENGTH)
 
     @property
     def parts(self) -> tuple[Effect, ...]:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Active, Stateful, require
-from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.arithmetic import Array, Scalar
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient
 from robot_dyn.foundations.threshold import Layer, Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -27,8 +27,8 @@ _REVERSAL = "velocity", "turns positive", "turns negative"
 class Bristles(Stateful):
     """Friction with one state for each joint: the deflection z of bristles of stiffness σ, which store ½ σ z²."""
 
-    bristle_stiffness: Any
-    coulomb: Any
+    bristle_stiffness: CoefficientField
+    coulomb: CoefficientField
 
     def state_size(self, n: int) -> int:
         return n
@@ -42,7 +42,7 @@ class Bristles(Stateful):
         joints = np.flatnonzero(stiffness > 0).tolist()
         return tuple(Layer(i, float(sliding[i] / stiffness[i]), level=None, state=i) for i in joints)
 
-    def reversals(self, slack: Any, n: int) -> tuple[Threshold, ...]:
+    def reversals(self, slack: Scalar, n: int) -> tuple[Threshold, ...]:
         """Return the thresholds at which a joint with bristles reverses, for speeds above the slack, (n,)."""
         acts, slow = np.broadcast_to(self.bristle_stiffness, n) > 0, np.broadcast_to(slack, n)
         return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])
@@ -70,12 +70,12 @@ class LuGreFriction(Bristles, Active):
         ...     static=1.2, stribeck_velocity=0.1)
     """
 
-    bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ₀", least=0))
-    bristle_damping: Any = field(metadata=coefficient("N m s/rad", symbol="σ₁", least=0))
-    viscous: Any = field(metadata=coefficient("N m s/rad", symbol="σ₂", least=0))
-    coulomb: Any = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
-    static: Any = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
-    stribeck_velocity: Any = field(metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
+    bristle_stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="σ₀", least=0))
+    bristle_damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="σ₁", least=0))
+    viscous: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="σ₂", least=0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
+    static: CoefficientField = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
+    stribeck_velocity: CoefficientField = field(metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
 
     name = "lugre_friction"
     term = "−(σ₀ z + σ₁ z' + σ₂ v), z' = v − σ₀ |v| z / g(v)"
@@ -85,7 +85,7 @@ class LuGreFriction(Bristles, Active):
         require("static must not be less than coulomb", np.greater_equal, self.static, self.coulomb)
 
     @property
-    def widths(self) -> tuple[Any, Any]:
+    def widths(self) -> tuple[Scalar, Scalar]:
         return inf, np.where(np.greater(self.static, self.coulomb), self.stribeck_velocity, inf)
 
     def layers(self, n: int) -> tuple[Layer, ...]:

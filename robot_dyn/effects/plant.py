@@ -223,14 +223,15 @@ def in_mode(plant: Plant, mode: Mode) -> Plant:
     return Plant(plant.dynamics, effects)
 
 
-def stated_friction(dynamics: Any) -> tuple[Effect, ...]:
+def stated_friction(dynamics: Dynamics) -> tuple[Effect, ...]:
     """Return the friction in the file of a robot.
 
     Raises:
         EffectError: If the dynamics does not come from a file.
     """
     try:
-        damping, friction = dynamics.damping, dynamics.friction
+        robot: Any = dynamics
+        damping, friction = robot.damping, robot.friction
     except AttributeError:
         raise EffectError(f"effects='urdf' needs a robot with a URDF, got {type(dynamics).__name__}") from None
     effects: list[Effect] = []

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -17,7 +17,13 @@ from robot_dyn.effects.effect import require
 from robot_dyn.effects.geared_motor import GearedMotor
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.coefficients import (
+    CoefficientField,
+    OptionalCoefficientField,
+    coefficient,
+    default,
+    with_values,
+)
 from robot_dyn.queries.dynamics import Dynamics
 
 
@@ -45,15 +51,23 @@ class RigidBacklash(GearedMotor, SetValued):
         >>> rd.effects.RigidBacklash(half_gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
     """
 
-    half_gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))
-    inertia: Any = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
-    ratio: Any = field(default=None, metadata=coefficient(symbol="n", above=0, elsewhere=1.0))
-    restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
-    viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
+    half_gap: CoefficientField = field(metadata=coefficient("rad", symbol="β", least=0))
+    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    ratio: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient(symbol="n", above=0, elsewhere=1.0)
+    )
+    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", least=0))
+    viscous: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("N m s/rad", symbol="b", least=0)
+    )
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
-    _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    held: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
+    _contact: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
 
     coupled: ClassVar[bool] = True
     through = "half_gap"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -12,7 +12,13 @@ from robot_dyn.effects.effect import require
 from robot_dyn.effects.joint_limit import LOWER, UPPER
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.coefficients import (
+    CoefficientField,
+    OptionalCoefficientField,
+    coefficient,
+    default,
+    with_values,
+)
 from robot_dyn.queries.dynamics import Dynamics
 
 _NEAR = 4e-15  # relative to a stop, or absolute in its unit: the precision to which events are located
@@ -36,11 +42,13 @@ class RigidStops(SetValued):
         >>> rd.effects.RigidStops(lower=-1.0, upper=[1.0, 2.0], restitution=0.3)
     """
 
-    lower: Any = field(metadata=LOWER)
-    upper: Any = field(metadata=UPPER)
-    restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
+    lower: CoefficientField = field(metadata=LOWER)
+    upper: CoefficientField = field(metadata=UPPER)
+    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", least=0))
 
-    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    held: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
 
     stops = True
     term = "lower ≤ q ≤ upper, v⁺ = −e v⁻"

@@ -10,14 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.geared_motor import GearedMotor
 from robot_dyn.foundations.arithmetic import Array, positive_part
-from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.coefficients import (
+    CoefficientField,
+    OptionalCoefficientField,
+    coefficient,
+    default,
+    with_values,
+)
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -52,15 +58,23 @@ class SeriesElastic(GearedMotor, Dissipative):
         ...     half_gap=0.01)
     """
 
-    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
-    inertia: Any = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
-    ratio: Any = field(default=None, metadata=coefficient(symbol="n", above=0, elsewhere=1.0))
-    damping: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="d", least=0))
-    viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
-    half_gap: Any = field(default=None, metadata=coefficient("rad", symbol="β", least=0))
+    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0))
+    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    ratio: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient(symbol="n", above=0, elsewhere=1.0)
+    )
+    damping: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("N m s/rad", symbol="d", least=0)
+    )
+    viscous: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("N m s/rad", symbol="b", least=0)
+    )
+    half_gap: OptionalCoefficientField = field(default=default(None), metadata=coefficient("rad", symbol="β", least=0))
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
-    _side: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    _side: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
 
     through = "stiffness"
     term = "k δ + d δ̇, n² J θ̈ = u − k δ − d δ̇ − b θ̇, δ = θ − q"

@@ -12,13 +12,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.settling import settle, settling
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import OptionalCoefficientField
 from robot_dyn.foundations.convex import LARGE, not_found
 from robot_dyn.foundations.threshold import smooth
 
@@ -53,7 +54,7 @@ class SetValued(Dissipative):
         stops: True if it has `bounds`, for time stepping.
     """
 
-    held: Any
+    held: OptionalCoefficientField
     rubs: ClassVar[bool] = False
     stops: ClassVar[bool] = False
 

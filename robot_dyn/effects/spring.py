@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Conservative, Effect
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import URDF, coefficient
+from robot_dyn.foundations.coefficients import URDF, CoefficientField, coefficient, default
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
@@ -29,8 +29,8 @@ class Spring(Conservative):
         >>> rd.effects.Spring(stiffness=2.0, rest=[0.1, -0.2])
     """
 
-    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0, stated="stated_stiffness"))
-    rest: Any = field(default=0.0, metadata=coefficient("rad", symbol="q₀", stated="stated_rest"))
+    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0, stated="stated_stiffness"))
+    rest: CoefficientField = field(default=default(0.0), metadata=coefficient("rad", symbol="q₀", stated="stated_rest"))
 
     term = "−k (q − q₀)"
     thresholds = smooth

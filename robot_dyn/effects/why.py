@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -20,6 +20,10 @@ from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_texts, unit, without_rounding
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _AT_REST = "dry friction and stops, at rest"
 _CAUSES: tuple[str, ...] = "inertia", "Coriolis", "gravity", "effect"
@@ -86,12 +90,12 @@ class Why(Answer):
 
 def why(
     plant: Plant | Dynamics,
-    q: Any,
-    v: Any,
-    a: Any | None,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike | None,
     joint: str,
     *,
-    tau: Any | None = None,
+    tau: ArrayLike | None = None,
     t: float | None = None,
 ) -> Why:
     """Split the torque of a joint by link and cause.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.effects.effect import Active, Timed, check_frame
 from robot_dyn.foundations.arithmetic import Array, transpose
 from robot_dyn.foundations.arithmetic import apply as times
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.validate import instance, rows
 from robot_dyn.queries.dynamics import Axes, Dynamics
@@ -38,7 +38,7 @@ class ExternalWrench(Timed, Active):
     """
 
     frame: str
-    wrench: Any = field(metadata=coefficient("N", symbol="F", shapes=((6,),)))
+    wrench: CoefficientField = field(metadata=coefficient("N", symbol="F", shapes=((6,),)))
     expressed_in: str = Axes.WORLD_ALIGNED
     start_s: float = field(default=0.0, metadata=_TIME)
     end_s: float = field(default=inf, metadata=_TIME)
@@ -50,7 +50,7 @@ class ExternalWrench(Timed, Active):
         super().__post_init__()
         object.__setattr__(self, "expressed_in", Axes.of(self.expressed_in))
 
-    def on(self, dynamics: Any) -> ExternalWrench:
+    def on(self, dynamics: Dynamics) -> ExternalWrench:
         check_frame(self, dynamics, self.frame)
         return self
 

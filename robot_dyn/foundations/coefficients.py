@@ -1,6 +1,6 @@
 """Declared coefficients: the parameters of an effect, controller or reference, each with unit, sign and meaning.
 
-    damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+    damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
 The declaration determines the checks of a coefficient, values by joint name or "urdf", its key in scenes and its name
 in sweeps, and makes it an input of machine code.
@@ -13,7 +13,7 @@ from copy import copy
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
 from functools import cache, cached_property
 from inspect import getattr_static
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, final
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, final, overload
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from robot_dyn.foundations.validate import instance, number, numbers, truth
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    CoefficientInput = ArrayLike | Mapping[str, float]  # numbers, values by joint name, or "urdf"
 
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
 URDF_SOFT = "urdf_soft"  # as the position of a stop: the soft limit in the robot's file
@@ -35,10 +37,35 @@ class Jointed(Protocol):
     """An arm with named joints."""
 
     @property
-    def name(self) -> str: ...
-
-    @property
     def joint_names(self) -> tuple[str, ...]: ...
+
+
+class CoefficientField(Protocol):
+    """The type of a field that is a coefficient: any input is accepted, and laws read numbers.
+
+    Values by joint name and "urdf" become numbers when a part is placed on an arm.
+    """
+
+    def __get__(self, part: object, kind: type | None = None) -> np.ndarray: ...
+
+    def __set__(self, part: object, values: CoefficientInput) -> None: ...
+
+
+class OptionalCoefficientField(Protocol):
+    """The type of a field that is a coefficient or None."""
+
+    def __get__(self, part: object, kind: type | None = None) -> np.ndarray | None: ...
+
+    def __set__(self, part: object, values: CoefficientInput | None) -> None: ...
+
+
+@overload
+def default(value: None) -> OptionalCoefficientField: ...
+@overload
+def default(value: CoefficientInput) -> CoefficientField: ...
+def default(value: object) -> object:
+    """Return the default of a coefficient unchanged; its type is that of the field, as for `dataclasses.field`."""
+    return value
 
 
 @final
@@ -132,7 +159,7 @@ class Coefficient:
             )
         return values
 
-    def _stated(self, name: str, values: str, dynamics: Jointed) -> np.ndarray:
+    def _stated(self, name: str, values: str, dynamics: Any) -> np.ndarray:
         try:
             stated = getattr(dynamics, f"soft_{self.stated}" if values is URDF_SOFT else self.stated)
         except AttributeError:

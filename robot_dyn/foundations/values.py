@@ -8,13 +8,13 @@ from dataclasses import fields
 from functools import cached_property
 from math import prod
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, final
 
 import numpy as np
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-    from numpy.typing import DTypeLike
+    from numpy.typing import ArrayLike, DTypeLike
 
 LINE = 64  # bytes of a cache line and of the widest vector: a vector across two lines takes two accesses
 
@@ -39,6 +39,14 @@ class Value:
         for name in frozen:
             for array in _arrays(values[name]):
                 array.setflags(write=False)
+
+
+class ArrayField(Protocol):
+    """The type of a field that accepts numbers and is read as an array."""
+
+    def __get__(self, part: object, kind: type | None = None) -> np.ndarray: ...
+
+    def __set__(self, part: object, values: ArrayLike) -> None: ...
 
 
 class Caching:

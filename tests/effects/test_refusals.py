@@ -107,7 +107,7 @@ IN_A_RUN = [
         lambda: setup(BODY, method="GaussLegendre4"),
         "carried_payload: .* changes momenta, which GaussLegendre4 integrates",
     ),
-    (lambda: rd.advise(plant(PLAY), Q), "advise: rigid_backlash frees and couples motors by turns"),
+    (lambda: rd.advise(plant(PLAY), Q), "advise: rigid_backlash couples and releases motors in turn"),
     (lambda: rd.advise(plant(BODY), Q), "advise: carried_payload changes the bodies"),
     *(
         (lambda ask=ask, method=method: ask(plant(DRY), Q, method=method), f"dry_friction: .* {why}.*DOP853")

@@ -36,12 +36,12 @@ def work_precision(
     By method and program. Ctrl-C ends it and keeps its runs.
 
     Options:
-        what (SCENE.toml|ROBOT): A scene file; or a robot, which then swings freely.
+        what (SCENE.toml|ROBOT): A scene file, or a robot for a free swing.
         method (METHOD): Only this method; may be repeated; all by default.
-        peers: Also run other installed programs, where they can.
-        q: Start of a robot, same as in query; random by default.
-        v: Its velocities; 0 by default.
-        duration (SECONDS): Of its motion; 1 by default.
+        peers: Also run other installed programs that can simulate the motion.
+        q: Initial positions of a robot, same as in query; random by default.
+        v: Initial velocities of a robot; 0 by default.
+        duration (SECONDS): Duration of the motion of a robot; 1 by default.
     """
     paths = results.files(rd.accuracy.WorkPrecision, what)
     setup = _setup(what, q, v, duration, options)

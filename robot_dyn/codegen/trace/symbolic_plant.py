@@ -165,7 +165,7 @@ class _TracedSetValued(_Torque, SetValued):
     friction = _method("friction", len)
 
     @property
-    def held(self) -> Any:
+    def held(self) -> Array:  # pyright: ignore[reportIncompatibleVariableOverride]  read only
         """1 for each held joint."""
         if self.inner.held is None:
             raise TraceError(f"effect {self.name} holds joints, and only a run determines which ones: {_INTERPRETED}")

@@ -324,7 +324,7 @@ def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant,
     return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
 
 
-def delay(name: str, value: Any) -> float:
+def delay(name: str, value: object) -> float:
     """Return a delay in periods, as a whole number if it differs from one only by rounding."""
     periods = number(name, value, error=ControlError)
     if not 0 <= periods <= _MOST:

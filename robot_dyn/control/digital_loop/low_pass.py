@@ -9,13 +9,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.foundations.arithmetic import Array, cos, sin, sqrt
-from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.coefficients import CoefficientField, coefficient
 from robot_dyn.foundations.errors import ControlError, shown
 
 
@@ -34,7 +34,7 @@ class LowPass(Block):
     term = "y = x through Butterworth's filter"
     rounds = False
 
-    cutoff_rad_s: Any = field(metadata=coefficient("rad/s", symbol="ω", above=0))
+    cutoff_rad_s: CoefficientField = field(metadata=coefficient("rad/s", symbol="ω", above=0))
     order: int = 2
 
     def __post_init__(self) -> None:

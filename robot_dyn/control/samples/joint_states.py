@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -18,6 +18,10 @@ from robot_dyn.control.samples.table import Table
 from robot_dyn.foundations.errors import PlanError, nearest, shorten, shown
 from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import reading
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 SUFFIX, TIMES = ".mcap", ("header", "log")
 _TYPE, _TOPIC = "sensor_msgs/msg/JointState", "/joint_states"
@@ -27,7 +31,9 @@ _LARGEST = 2**30  # largest record, in bytes
 needs_data = partial(needs, extra="data")
 
 
-def read_joint_states(path: str | Path, joint_names: tuple[str, ...], topic: str | None, time: Any) -> Table:
+def read_joint_states(
+    path: str | Path, joint_names: tuple[str, ...], topic: str | None, time: ArrayLike | None
+) -> Table:
     """Return positions by joint name from a topic of an MCAP log, with times from the first message.
 
     Args:

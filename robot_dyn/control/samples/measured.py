@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,18 +18,24 @@ from robot_dyn.foundations.validate import choice, instance, number
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from robot_dyn.control.samples.sources import Source
+
+
 _ROUNDED = 0.01  # fraction of the time between two samples: larger rounding of the times raises an error
 
 
 def from_samples(
     arm: Robot,
-    source: Any,
+    source: Source,
     *,
-    time: Any = None,
-    joints: Any = None,
+    time: ArrayLike | None = None,
+    joints: Mapping[str, str] | None = None,
     unit: str | None = None,
     ends: str | None = None,
-    q0: Any = None,
+    q0: ArrayLike | None = None,
     start_s: float | None = None,
     topic: str | None = None,
 ) -> Plan:

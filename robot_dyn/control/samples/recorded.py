@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -16,6 +16,12 @@ from robot_dyn.foundations.errors import PlanError, nearest, shown
 from robot_dyn.foundations.validate import choice, instance, number, numbers
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from robot_dyn.control.samples.sources import Source
+
 
 # headings other than t and q in the table of a run
 _OF_A_RUN = re.compile(r"([vau]|tau|power|start|desired|tracking error) .*|energy|residual|.* state \d+")
@@ -71,12 +77,12 @@ class Recorded:
 
 def recorded(
     arm: Robot,
-    source: Any,
-    time: Any = None,
-    joints: Any = None,
-    unit: Any = None,
-    q0: Any = None,
-    topic: Any = None,
+    source: Source,
+    time: ArrayLike | None = None,
+    joints: Mapping[str, str] | None = None,
+    unit: str | None = None,
+    q0: ArrayLike | None = None,
+    topic: str | None = None,
     least: int = 2,
 ) -> Recorded:
     """Return the samples of a source, at least `least`; see `from_samples`."""
@@ -107,7 +113,7 @@ def recorded(
     return Recorded(arm, t, q, stated, np.array([name in at for name in arm.joint_names]), of_time, more, table.note)
 
 
-def _times(table: Table, time: Any, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
+def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
     """Return the other columns, the times in [s], and True if their unit is known."""
     heads, stated = table.columns, True
     lengths = {len(x) if x.ndim == 1 else 0 for x in heads.values()}
@@ -160,7 +166,7 @@ def _time_heading(heads: Mapping[str, np.ndarray], time: str | None) -> str:
     raise PlanError(f"{fault}; {remedy}")
 
 
-def _heading(name: Any, heads: Mapping[str, np.ndarray]) -> str:
+def _heading(name: str, heads: Mapping[str, np.ndarray]) -> str:
     """Return the requested heading, which may be passed without its unit."""
     without_unit = [head for head in heads if name_of(head) == name]
     if name not in heads and len(without_unit) == 1:
@@ -175,7 +181,7 @@ def _since_first(head: str, t: np.ndarray) -> np.ndarray:
     return (t - t[0]).astype("timedelta64[ns]").astype(float) * 1e-9
 
 
-def _joints(arm: Robot, heads: Mapping[str, np.ndarray], joints: Mapping[str, Any] | None) -> dict[str, str]:
+def _joints(arm: Robot, heads: Mapping[str, np.ndarray], joints: Mapping[str, str] | None) -> dict[str, str]:
     """Return the heading of each joint that has a column."""
     if joints is not None:
         for joint in joints:

@@ -6,9 +6,9 @@ In a CSV file the first line names the columns, commas separate them, and decima
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -18,17 +18,36 @@ from robot_dyn.foundations.errors import PlanError, shorten, shown
 from robot_dyn.foundations.files import csv_rows
 from robot_dyn.foundations.validate import numbers
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+class DataFrame(Protocol):
+    """A table of pandas or polars."""
+
+    @property
+    def columns(self) -> Iterable[object]: ...
+
+    def to_numpy(self) -> np.ndarray: ...
+
+
+if TYPE_CHECKING:
+    Source = str | Path | ArrayLike | Mapping[str, ArrayLike] | DataFrame
+
 _MOST_BYTES = 2**28
 _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
 
 
-def table_of(source: Any, joint_names: tuple[str, ...], joints: Mapping[str, Any], topic: Any, time: Any) -> Table:
+def table_of(
+    source: Source, joint_names: tuple[str, ...], joints: Mapping[str, str], topic: str | None, time: ArrayLike | None
+) -> Table:
     """Return the columns of a source; the columns of an array without headings are the joints.
 
     Raises:
         PlanError: If the source cannot be read, or has a column twice.
     """
-    is_file, by_name = isinstance(source, str | Path), time is None or isinstance(time, str)
+    is_file = isinstance(source, str | Path)
+    by_name = time is None or isinstance(time, str)
     if is_file and Path(source).suffix.lower() == SUFFIX:
         names = tuple(name for name in joints.values() if isinstance(name, str)) or joint_names
         return read_joint_states(source, names, topic, time)

@@ -10,12 +10,16 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
 from robot_dyn.foundations.errors import ControlError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 
 _MISSED = 1e-6  # relative to the largest sample: far above rounding, far below the error of a failed spline
 
@@ -42,7 +46,7 @@ class Samples(PiecewisePolynomial):
     """
 
     @np.errstate(all="ignore")  # overflow raises an error
-    def __init__(self, t: Any, q: Any, v: Any = None, a: Any = None) -> None:
+    def __init__(self, t: ArrayLike, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None) -> None:
         q = numbers("q", q, ("m", "n"))
         if len(q) < 2:
             raise ControlError(f"q: at least 2 samples are needed, got {len(q)}; to rest at one position, use hold(q)")

@@ -11,7 +11,15 @@ from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
-from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
+from robot_dyn.simulation.diagnostics.step_remarks import (
+    KINDS,
+    QUANTITIES,
+    Units,
+    against,
+    of_reference,
+    of_steps,
+    units_of,
+)
 from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
@@ -37,8 +45,17 @@ def overview(runs: RolloutsData) -> Overview:
 
 
 def remarks_on_each(runs: RolloutsData) -> tuple[Remark, ...]:
-    """Return the remarks that do not depend on the other runs of the batch, without remedies."""
-    return tuple(_remarks(runs, lambda _: lambda _: {}))
+    """Return the remarks that do not depend on the other runs of the batch, without remedies.
+
+    Their order, by kind, quantity and joint, does not depend on the other runs either.
+    """
+    kinds = list(RemarkKind)
+
+    def place(remark: Remark) -> tuple[int, int, int]:
+        joint = runs.joint_names.index(remark.joint)
+        return kinds.index(remark.kind), QUANTITIES.index(remark.quantity), joint
+
+    return tuple(sorted(_remarks(runs, lambda _: lambda _: {}), key=place))
 
 
 def _remarks(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:

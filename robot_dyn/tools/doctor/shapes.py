@@ -240,8 +240,8 @@ def directions(
             inertial = document.named("link", name).find("inertial")
             yield document.finding(
                 severity, "inertia_direction", inertial,
-                f"along one direction its moments need {ratio:.3g} times the second moment that {body.mass:g} kg can"
-                " have within its shape",
+                f"along one direction its moments imply a second moment {ratio:.3g} times the largest that"
+                f" {body.mass:g} kg can have within its shape",
                 "correct the moments: their axes, the signs of the products, or the numbers",
             )  # fmt: skip
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from fractions import Fraction
 from math import isfinite
-from typing import Any
 
 import numpy as np
 from flint import arb
@@ -17,7 +16,7 @@ from robot_dyn.tools.proof.enclosure.step import State
 from robot_dyn.tools.proof.motion import Motion
 
 
-def start(names: tuple[str, ...], centre: tuple[Any, Any], widths: tuple[float, float]) -> State:
+def start(names: tuple[str, ...], centre: tuple[object, object], widths: tuple[float, float]) -> State:
     """Return the set of starts: its centre is rounded to the current precision, and the set includes the rounding."""
     balls = [numbers_of(name, x, names) for name, x in zip(("q0", "v0"), centre, strict=True)]
     q, v = (tuple((+x).mid() for x in values) for values in balls)
@@ -29,7 +28,7 @@ def start(names: tuple[str, ...], centre: tuple[Any, Any], widths: tuple[float, 
     return State(Fraction(0), q, v, box(r))
 
 
-def numbers_of(name: str, values: Any, joint_names: tuple[str, ...]) -> list[Any]:
+def numbers_of(name: str, values: object, joint_names: tuple[str, ...]) -> list[arb]:
     """Return one ball for each joint, from decimals as text, numbers, which are exact, or balls.
 
     Raises:

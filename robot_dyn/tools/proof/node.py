@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 from flint import arb, ctx
 
@@ -70,12 +70,12 @@ def node_of(state: State, step: Step | None = None) -> Node:
     return Node(t, of_joints(q), of_joints(v), polynomial, of_joints(step.tube.B[:n]), of_joints(step.tube.B[n:]))
 
 
-def on_the_way(start: float, node: Node) -> Callable[[float], tuple[list[Any], list[Any]]]:
+def on_the_way(start: float, node: Node) -> Callable[[float], tuple[list[arb], list[arb]]]:
     """Return a function of time whose balls contain q and v on the step from `start` to the node, in its precision."""
     q = tuple(tuple(map(unpacked, coefficients)) for coefficients in node.polynomial)
     v, wide_q, wide_v = derivatives(q), [*map(unpacked, node.tube_q)], [*map(unpacked, node.tube_v)]
 
-    def at(t: float) -> tuple[list[Any], list[Any]]:
+    def at(t: float) -> tuple[list[arb], list[arb]]:
         tau = arb(t) - arb(start)
         return (
             [horner(c, tau) + b for c, b in zip(q, wide_q, strict=True)],

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from time import perf_counter
-from typing import Any
 
 from flint import ctx
+from numpy.typing import ArrayLike
 
 from robot_dyn import Setup
 from robot_dyn.foundations import Ball, QueryError, duration, function, instance, integer, number
@@ -29,8 +29,8 @@ def prove(
     until_s: float | None = None,
     bits: int = 100,
     *,
-    q0: Any = None,
-    v0: Any = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
     width_q: float = 0.0,
     width_v: float = 0.0,
     budget_s: float = 60.0,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from operator import add, methodcaller, mul, neg, sub, truediv
-from typing import Any, final
+from typing import Any, Protocol, TypeVar, final
 
 import casadi as ca
 from flint import arb, ctx
@@ -20,6 +20,14 @@ from robot_dyn.foundations import ProofError
 from robot_dyn.lagrange import composite_body
 from robot_dyn.tools.proof.motion import Bodies, Motion
 from robot_dyn.tools.proof.term import Literals, expressions
+
+Number = TypeVar("Number")  # a ball, or a truncated power series of balls; results have the type of arguments
+
+
+class Function(Protocol):
+    """A function of balls, or of truncated power series of balls."""
+
+    def __call__(self, x: Sequence[Number], /) -> Sequence[Number]: ...
 
 
 @final
@@ -47,15 +55,15 @@ class Tape:
         self._functions = {name: straight_line(program) for name, program in self.programs.items()}
         self._rounded: dict[int, list[Any]] = {}
 
-    def residual(self, t: Any, q: Sequence[Any], v: Sequence[Any], a: Sequence[Any]) -> Sequence[Any]:
+    def residual(self, t: Number, q: Sequence[Number], v: Sequence[Number], a: Sequence[Number]) -> Sequence[Number]:
         """Return R(t, q, v, a), n numbers, 0 for the true motion."""
         return self._of("residual", [*q, *v, *a, t])
 
-    def mass(self, q: Sequence[Any]) -> Sequence[Any]:
+    def mass(self, q: Sequence[Number]) -> Sequence[Number]:
         """Return M(q), n² numbers row by row."""
         return self._of("mass", q)
 
-    def derivatives(self, t: Any, q: Sequence[Any], v: Sequence[Any], a: Sequence[Any]) -> Sequence[Any]:
+    def derivatives(self, t: Number, q: Sequence[Number], v: Sequence[Number], a: Sequence[Number]) -> Sequence[Number]:
         """Return ∂R/∂(q, v, a), 3 n² numbers row by row; the last n columns are M."""
         return self._of("derivatives", [*q, *v, *a, t])
 
@@ -81,8 +89,6 @@ def _traced(motion: Motion, arithmetic: Literals, piece: float) -> dict[str, tup
         "derivatives": ([q, v, a, t], ca.cse(ca.vec(derivatives.T))),
     }
 
-
-Function = Callable[[Sequence[Any]], Sequence[Any]]
 
 _MOST = 16.0  # bound of constants from CasADi: exact halves, unlike rounded decimals
 

@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import add
-from typing import Any, final
+from typing import Any, SupportsFloat, final
 
 import casadi as ca
 import numpy as np
@@ -36,10 +36,10 @@ class Constants:
 
     def __init__(self) -> None:
         self.symbols: list[Node] = []
-        self.balls: list[Any] = []
+        self.balls: list[arb] = []
         self._nodes: dict[tuple[Any, Any], Node] = {}
 
-    def node(self, ball: Any) -> Node:
+    def node(self, ball: arb) -> Node:
         """Return the node of a ball: an exact 0 or ±1 as a constant, any other as an input or its negative."""
         if ball.is_exact() and ball.is_integer() and abs(ball) <= 1:
             return ca.SX(int(float(ball)))
@@ -66,7 +66,7 @@ class Term:
 
     __slots__ = ("constant", "node")
 
-    def __init__(self, constant: Any, node: Node | None = None) -> None:
+    def __init__(self, constant: arb, node: Node | None = None) -> None:
         self.constant: Any = constant
         self.node: Any = node
 
@@ -76,7 +76,7 @@ class Term:
         c = CONSTANTS.get().node(self.constant)
         return c if self.node is None else c + self.node
 
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Term | float) -> Term:
         if (x := _term(other)) is None:
             return NotImplemented
         nodes = [term.node for term in (self, x) if term.node is not None]
@@ -90,13 +90,13 @@ class Term:
     def __pos__(self) -> Term:
         return self
 
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: Term | float) -> Term:
         return NotImplemented if (x := _term(other)) is None else self + -x
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: Term | float) -> Term:
         return -self + other
 
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Term | float) -> Term:
         if (x := _term(other)) is None:
             return NotImplemented
         if x.node is None:
@@ -110,17 +110,17 @@ class Term:
             return Term(self.constant * k)
         return Term(self.constant * k, CONSTANTS.get().node(k) * self.node)
 
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Term | float) -> Term:
         if (x := _term(other)) is None:
             return NotImplemented
         if x.node is None:
             return self._times(1 / x.constant)
         return self if self.node is None and self.constant.is_zero() else _of(self.expression / x.expression)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: Term | float) -> Term:
         return NotImplemented if (x := _term(other)) is None else x / self
 
-    def __pow__(self, exponent: Any) -> Term:
+    def __pow__(self, exponent: float) -> Term:
         if exponent != 2:
             raise TypeError("only squares are supported")
         return self * self
@@ -164,19 +164,19 @@ class Term:
         a, b = self.constant.mid(), x.constant.mid()
         return bool(a <= b if or_equal else a < b)
 
-    def __lt__(self, other: Any) -> bool:
+    def __lt__(self, other: Term | float) -> bool:
         return self._below(other, or_equal=False)
 
-    def __le__(self, other: Any) -> bool:
+    def __le__(self, other: Term | float) -> bool:
         return self._below(other, or_equal=True)
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: Term | float) -> bool:
         return (-self)._below(-other, or_equal=False)
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: Term | float) -> bool:
         return (-self)._below(-other, or_equal=True)
 
-    def __eq__(self, other: object) -> Any:
+    def __eq__(self, other: object) -> bool:
         if (x := _term(other)) is None:
             return NotImplemented
         return self.node is None and x.node is None and bool(self.constant == x.constant)  # both exact
@@ -184,7 +184,7 @@ class Term:
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
 
-def expressions(array: Any) -> Node:
+def expressions(array: Array) -> Node:
     """Return the entries of an array, row by row, as one CasADi column."""
     terms = (_term(x) for x in np.asarray(array, dtype=object).flat)
     return ca.vertcat(*(x.expression for x in terms if x is not None))
@@ -215,7 +215,7 @@ class Literals(Arithmetic):
     constants: Constants = field(default_factory=Constants, repr=False)
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
 
-    def number(self, literal: Any) -> Term:
+    def number(self, literal: Term | str | SupportsFloat) -> Term:
         return literal if isinstance(literal, Term) else Term(BALLS.number(literal))
 
     @contextmanager
@@ -227,7 +227,7 @@ class Literals(Arithmetic):
         finally:
             CONSTANTS.reset(token)
 
-    def asarray(self, values: Any) -> Array:
+    def asarray(self, values: object) -> Array:
         return self.array(values)
 
     def finite(self, x: Array) -> np.ndarray:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import inf, log10, nextafter
 from typing import Any, final
 
 import numpy as np
+from flint import arb
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations import (
     UNREPORTED,
@@ -111,7 +113,7 @@ class Proof(Answer, Value):
                 q, v = on_the_way(self.nodes[k].t, self.nodes[k + 1])(t)
         return _array(q), _array(v)
 
-    def contains(self, t: float, q: Any, v: Any = None) -> bool:
+    def contains(self, t: float, q: ArrayLike | Sequence[arb], v: ArrayLike | Sequence[arb] | None = None) -> bool:
         """Return True if a state, or all of a state of balls, is in the balls at t; without v, only q is compared.
 
         Args:
@@ -131,7 +133,7 @@ class Proof(Answer, Value):
                 bool(ball.contains(x)) for name in state for x, ball in zip(state[name], balls[name], strict=True)
             )
 
-    def digits_of(self, t: Any, q: Any) -> float:
+    def digits_of(self, t: ArrayLike, q: ArrayLike) -> float:
         """Return the decimal digits of positions that the theorem confirms: −log₁₀ of the largest possible error.
 
         Args:

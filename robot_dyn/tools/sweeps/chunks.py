@@ -11,17 +11,18 @@ from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from itertools import islice
-from typing import Any
+from typing import TypeVar
 
 from robot_dyn.foundations import SweepError, shown
 from robot_dyn.tools.sweeps.work import Stopped
 
+Done = TypeVar("Done")
 _ATTEMPTS = 20  # rounds without a new file, after which a chunk is assumed to kill its worker
 _LOOK_S = 0.5
 
 
 def fill(
-    submit: Callable[[int], Future[Any]],
+    submit: Callable[[int], Future[Done]],
     missing: Callable[[], list[int]],
     capacity: Callable[[], int],
     look: Callable[[], object],
@@ -42,7 +43,7 @@ def fill(
     """
     left, attempts = missing(), 0
     while left:
-        waiting, pending = iter(left), set[Future[Any]]()
+        waiting, pending = iter(left), set[Future[Done]]()
         try:
             while True:  # until each chunk was submitted once and has ended
                 pending |= {submit(chunk) for chunk in islice(waiting, max(0, capacity() - len(pending)))}
@@ -99,7 +100,7 @@ def fill_by_threads(
             stop.set()
 
 
-def share_of(text: Any) -> tuple[int, int]:
+def share_of(text: object) -> tuple[int, int]:
     """Return job and number of jobs of a share such as "3/16"; None means all chunks.
 
     Raises:

@@ -56,7 +56,7 @@ class Ticket:
 
 
 @contextmanager
-def client_of(cluster: Any) -> Iterator[Any]:
+def client_of(cluster: object) -> Iterator[Any]:
     """Connect to a cluster; "local:2x4" starts 2 processes with 4 threads each on this machine.
 
     Args:

@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, final
+from typing import final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations import SweepError, Value, choice, integer, needs, numbers
 
@@ -58,7 +59,7 @@ class Design(Value):
         return np.arange(len(self.rows)) // self.block % scramblings
 
 
-def design(name: str | Any, runs: int, dimensions: int, seed: int = 0) -> Design:
+def design(name: ArrayLike, runs: int, dimensions: int, seed: int = 0) -> Design:
     """Draw a design by name, or use a table of rows.
 
     Args:
@@ -77,7 +78,7 @@ def design(name: str | Any, runs: int, dimensions: int, seed: int = 0) -> Design
     return _design(name, _drawn(name, runs, dimensions, seed))
 
 
-def given(table: Any, runs: int, dimensions: int, name: str = "table") -> Design:
+def given(table: ArrayLike, runs: int, dimensions: int, name: str = "table") -> Design:
     """Return the design of a table of rows; raise a SweepError unless it has N rows of d numbers in [0, 1)."""
     rows = numbers("the table of a design", table, ("N", "d"), error=SweepError, least=0.0)
     if (rows >= 1).any():

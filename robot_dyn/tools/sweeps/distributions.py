@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations import SweepError, Value, numbers, shown
 from robot_dyn.tools.sweeps.texts import call_of, called
@@ -110,32 +111,32 @@ class Distribution(Value):
         arguments = (f"{'' if key.isdigit() else f'{key}='}{x.tolist()}" for key, x in self.parameters.items())
         return f"{self.name}({', '.join(arguments)})"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return name and numbers, for JSON; `from_dict` returns an equal distribution."""
-        return {"distribution": self.name} | {key: x.tolist() for key, x in self.parameters.items()}
+        return {"distribution": self.name, **{key: x.tolist() for key, x in self.parameters.items()}}
 
 
-def uniform(*, low: Any, high: Any) -> Distribution:
+def uniform(*, low: ArrayLike, high: ArrayLike) -> Distribution:
     """Return a uniform distribution from low to high; numbers or arrays (n,), in the unit of the parameter."""
     return Distribution("uniform", {"low": low, "high": high})
 
 
-def normal(*, mean: Any, sd: Any) -> Distribution:
+def normal(*, mean: ArrayLike, sd: ArrayLike) -> Distribution:
     """Return a normal distribution; mean and standard deviation are numbers or arrays (n,), in the parameter's unit."""
     return Distribution("normal", {"mean": mean, "sd": sd})
 
 
-def lognormal(*, median: Any, sigma_of_log: Any) -> Distribution:
+def lognormal(*, median: ArrayLike, sigma_of_log: ArrayLike) -> Distribution:
     """Return a log-normal distribution with median and standard deviation of the logarithm; numbers or arrays (n,)."""
     return Distribution("lognormal", {"median": median, "sigma_of_log": sigma_of_log})
 
 
-def triangular(*, low: Any, mode: Any, high: Any) -> Distribution:
+def triangular(*, low: ArrayLike, mode: ArrayLike, high: ArrayLike) -> Distribution:
     """Return a triangular distribution from low to high with the peak at mode; numbers or arrays (n,)."""
     return Distribution("triangular", {"low": low, "mode": mode, "high": high})
 
 
-def choice(values: Any) -> Distribution:
+def choice(values: ArrayLike) -> Distribution:
     """Return a distribution of equally likely values: numbers, shape (m,), or rows of n numbers, shape (m, n)."""
     return Distribution("choice", {"values": values})
 
@@ -143,7 +144,7 @@ def choice(values: Any) -> Distribution:
 CONSTRUCTORS = {constructor.__name__: constructor for constructor in (uniform, normal, lognormal, triangular, choice)}
 
 
-def distribution(value: Any) -> Distribution:
+def distribution(value: object) -> Distribution:
     """Return a distribution from one of this module, its text, or a frozen one of scipy.stats.
 
     Raises:
@@ -153,7 +154,8 @@ def distribution(value: Any) -> Distribution:
         return value
     if isinstance(value, str):
         return called("distribution", value, CONSTRUCTORS)
-    kind = getattr(value, "dist", None)
+    frozen: Any = value
+    kind = getattr(frozen, "dist", None)
     name, stored = getattr(kind, "name", ""), None
     if isinstance(name, str) and kind is not None and type(value).__module__.startswith("scipy.stats"):
         from scipy import stats
@@ -164,10 +166,10 @@ def distribution(value: Any) -> Distribution:
             f"a distribution must be {', '.join(CONSTRUCTORS)}, or a frozen one of scipy.stats such as"
             f" stats.gamma(2.0), got {shown(value)}"
         )
-    return Distribution(_SCIPY + name, {str(k): x for k, x in enumerate(value.args)} | value.kwds)
+    return Distribution(_SCIPY + name, {str(k): x for k, x in enumerate(frozen.args)} | frozen.kwds)
 
 
-def from_dict(stored: Mapping[str, Any]) -> Distribution:
+def from_dict(stored: Mapping[str, object]) -> Distribution:
     """Return the distribution of a dictionary from `to_dict`.
 
     Raises:
@@ -175,8 +177,8 @@ def from_dict(stored: Mapping[str, Any]) -> Distribution:
         KeyError, TypeError or ValueError: If the value is not a dictionary, or has no name.
     """
     parameters = dict(stored)
-    name = parameters.pop("distribution")
-    if str(name).startswith(_SCIPY):
+    name = str(parameters.pop("distribution"))
+    if name.startswith(_SCIPY):
         return Distribution(name, parameters)
     return call_of("distribution", name, CONSTRUCTORS, (), parameters)
 

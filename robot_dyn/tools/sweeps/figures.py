@@ -10,7 +10,6 @@ import typing
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import Any
 
 import numpy as np
 
@@ -214,10 +213,10 @@ class Figure(Value):
             raise SweepError(f"final({self.of_what!r}) needs a joint; give joint=, one of {names}")
         return np.abs(last).max(axis=1) if self.of_what == "tracking_error" else last[:, 0]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return name and arguments, for JSON."""
-        quantity = {} if self.name == "rms_tracking_error" else {"of_what": self.of_what}
-        return {"figure": self.name} | quantity | {"joint": self.joint}
+        quantity: dict[str, object] = {} if self.name == "rms_tracking_error" else {"of_what": self.of_what}
+        return {"figure": self.name, **quantity, "joint": self.joint}
 
     def __str__(self) -> str:
         _, *arguments = self.to_dict().items()
@@ -248,7 +247,7 @@ class UserFigure(Value):
     stated: tuple[str, str] | None = None
 
     @property
-    def function(self) -> Any:
+    def function(self) -> Callable[..., object]:
         """The function; a SweepError if a folder names it, but its reader has not."""
         if self.stated is not None:
             raise SweepError(
@@ -278,7 +277,7 @@ class UserFigure(Value):
     def __str__(self) -> str:
         return self.path
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the import path, the SHA-256 of its module, and the unit."""
         digest = digest_of(self.path) if self.stated is None else self.stated[0]
         return {"figure": self.path, "sha256": digest, "unit": self.unit()}
@@ -310,7 +309,7 @@ FIGURES: Mapping[str, Callable[..., Figure]] = {
 }
 
 
-def figure(name: str, value: Any) -> Figure | UserFigure:
+def figure(name: str, value: object) -> Figure | UserFigure:
     """Return a figure from a figure, its text, a function, or the import path of a function.
 
     Raises:
@@ -328,7 +327,7 @@ def figure(name: str, value: Any) -> Figure | UserFigure:
     return user
 
 
-def from_dict(stored: Mapping[str, Any], may_import: bool = False) -> Figure | UserFigure:
+def from_dict(stored: Mapping[str, object], may_import: bool = False) -> Figure | UserFigure:
     """Return the figure of a dictionary from `to_dict`; raise SweepError, KeyError or TypeError for other forms.
 
     Args:
@@ -336,7 +335,7 @@ def from_dict(stored: Mapping[str, Any], may_import: bool = False) -> Figure | U
         may_import: True if a function may be imported, because the reader of the folder named it.
     """
     arguments = dict(stored)
-    kind = arguments.pop("figure")
+    kind = str(arguments.pop("figure"))
     if ":" in kind:
         return UserFigure(path_of(kind), None if may_import else (str(arguments["sha256"]), str(arguments["unit"])))
     return call_of("figure", kind, FIGURES, (), arguments)

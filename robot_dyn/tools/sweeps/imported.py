@@ -39,21 +39,21 @@ class Named:
 NOTHING = Named()
 
 
-def named(scene: Any, figures: Any) -> Named:
+def named(scene: object, figures: object) -> Named:
     """Return the scene and figures that a reader names; for errors, see `source_of` and `path_of`."""
     functions = by_name("figures", {} if figures is None else figures, "settling")
     paths = tuple((name, path_of(function)) for name, function in functions.items())
     return Named(None if scene is None else source_of(scene), paths)
 
 
-def by_name(what: str, given: Any, example: str) -> dict[str, Any]:
+def by_name(what: str, given: object, example: str) -> dict[str, object]:
     """Return distributions, figures or functions by name; raise a SweepError unless they are a mapping."""
     if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
         raise SweepError(f"{what}: give them by name, as {{{example!r}: …}}, got {shown(given)}")
     return dict(given)
 
 
-def source_of(scene: Any) -> str:
+def source_of(scene: object) -> str:
     """Return the absolute path of a scene file, or the import path of a function; raise a SweepError for others."""
     if isinstance(scene, Path) or (isinstance(scene, str) and is_scene(scene)):
         return str(Path(scene).absolute())
@@ -76,7 +76,7 @@ def is_import_path(text: str) -> bool:
     return ":" in text and "(" not in text
 
 
-def path_of(function: Any) -> str:
+def path_of(function: object) -> str:
     """Return the import path of a function, or check a text that is one.
 
     Raises:
@@ -98,7 +98,7 @@ def path_of(function: Any) -> str:
     return f"{module}:{name}"
 
 
-def imported(path: str) -> Callable[..., Any]:
+def imported(path: str) -> Callable[..., object]:
     """Import the function of an import path; modules may be in the working directory.
 
     Raises:
@@ -123,7 +123,7 @@ def digest_of(path: str) -> str:
     return _digest(path, getattr(module, "__file__", None))
 
 
-def check_named(path: str, digest: Any, folder: Path) -> None:
+def check_named(path: str, digest: object, folder: Path) -> None:
     """Compare the file of a function with the digest that a folder states, before the function is imported.
 
     Raises:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
@@ -90,7 +90,11 @@ class SweepResult(Answer):
         return {name: table[name] for name in names}
 
     def quantiles(
-        self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95, given: str | None = None
+        self,
+        figure: str,
+        probabilities: Sequence[float] | float = (0.05, 0.5, 0.95),
+        level: float = 0.95,
+        given: str | None = None,
     ) -> tuple[Estimate, ...]:
         """Estimate quantiles of a figure with intervals; a failed run without a value counts as +∞.
 
@@ -299,7 +303,7 @@ class SweepResult(Answer):
         return {"runs": self.sweep.runs, "chunks": self.folder.count, "missing": len(self.missing)}
 
     @reported
-    def specification(self) -> dict[str, Any]:
+    def specification(self) -> dict[str, object]:
         """Return the specification in the folder."""
         return specification(self.sweep, self.folder.chunk).model_dump(mode="json")
 

@@ -11,6 +11,7 @@ from hashlib import sha256
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from robot_dyn import Rollouts
 from robot_dyn.foundations import needs
@@ -36,11 +37,11 @@ class Column:
     """
 
     name: str
-    type: Any
+    type: DTypeLike
     unit: str
     meaning: str
-    missing: Any
-    values: Callable[[Rollouts], Any]
+    missing: str | float
+    values: Callable[[Rollouts], Sequence[str] | np.ndarray]
 
 
 FIXED = (
@@ -67,7 +68,7 @@ TEXTS = tuple(column.name for column in FIXED if column.type is not float)
 NUMBERS = tuple(column.name for column in FIXED if column.type is float)
 
 
-def type_of(name: str) -> Any:
+def type_of(name: str) -> DTypeLike:
     """Return the type of a column in memory; varied parameters and figures are float64."""
     return TYPES.get(name, float)
 

@@ -30,7 +30,7 @@ from robot_dyn.tools.sweeps.specification import (
     stated_in,
 )
 from robot_dyn.tools.sweeps.sweep import Sweep
-from robot_dyn.tools.sweeps.work import Work
+from robot_dyn.tools.sweeps.work import Stopped, Work
 
 Progress = Callable[[int, int], object]
 _SCAN_S = 1.0  # time between scans of the folder
@@ -46,7 +46,7 @@ def run(
     folder: str | Path,
     *,
     threads: int | None = None,
-    cluster: Any = None,
+    cluster: object = None,
     job: str | None = None,
     chunk: int | None = None,
     on_progress: Progress | None = None,
@@ -175,8 +175,17 @@ def pilot(sweep: Sweep, chunk: int | None = None) -> int:
 
     Raises:
         SweepError: If no run finishes and some runs or their figures raise; with the first reason.
+        KeyboardInterrupt: If Ctrl-C stops a run.
     """
-    work, count = Work(sweep), min(_RUNS, sweep.runs)
+    try:
+        return _pilot(Work(sweep), sweep, chunk)
+    except Stopped:
+        raise KeyboardInterrupt from None
+
+
+def _pilot(work: Work, sweep: Sweep, chunk: int | None) -> int:
+    """Run the pilot, see `pilot`; raise `Stopped` after Ctrl-C."""
+    count = min(_RUNS, sweep.runs)
     rows = work.rows(0, count)  # includes compiling
     raised = rows["outcome"] == RAISED
     if raised.any() and not (rows["outcome"] == FINISHED).any():

@@ -14,8 +14,9 @@ class SweepTable(Part):
 
     Values of `vary` and `figures` are texts, which are parsed but not executed: distributions `uniform(low=0, high=3)`,
     `normal(mean=1, sd=0.1)`, `lognormal(median=1, sigma_of_log=0.2)`, `triangular(low=0, mode=1, high=3)`,
-    `choice([50, 100])`, of lists of numbers for arrays; figures `rms_tracking_error()`, `peak('u')`,
-    `final('q', 'joint')`.
+    `choice([50, 100])`. An array takes lists, for example `normal(mean=[0, 1.2], sd=0.1)` for the `q0` of two joints.
+    The reference does not move with `q0`; it is built from the start of the scene. Figures are `rms_tracking_error()`,
+    `peak('u')` and `final('q', 'joint')`.
     """
 
     runs: Annotated[int, Field(gt=0, strict=True)]

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil, floor, inf, isinf, isnan, log, log1p, nan, sqrt
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -254,7 +254,7 @@ def _note_of_quantile(p: float, level: float, n: int, estimate: float, low: floa
     return f"{n} runs, or those that finished, do not bound the quantile; at least {count} independent runs are needed"
 
 
-def check_level(level: Any) -> float:
+def check_level(level: object) -> float:
     """Return a level between 0 and 1; raise a SweepError for other values."""
     level = number("level", level, error=SweepError, above=0.0)
     if level >= 1:

@@ -166,7 +166,8 @@ class Sweep(Answer, Value):
         n, values = self.setup.plant.dynamics.n, self._values(np.full((2, len(self.dimensions)), 0.5))
         for name in STARTS:
             if (size := values.pop(name, np.empty((2, n))).shape[1]) != n:
-                raise SweepError(f"vary: {name} has {n} numbers, got a distribution of {size}; give arrays of {n}")
+                message = f"vary: {name} has {n} numbers, got a distribution of {size}; give arrays of {n}"
+                raise SweepError(f"{message}, for example normal(mean={[0] * n}, sd=0.1)")
         try:
             batch_of(self.setup, None, None, values, ())
         except QueryError as error:

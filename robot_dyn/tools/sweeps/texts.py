@@ -8,10 +8,11 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter, signature
-from typing import Any
+from typing import TypeVar
 
 from robot_dyn.foundations import SweepError, nearest, shorten, shown
 
+Result = TypeVar("Result")
 _MOST = 10_000  # largest number of characters of a text
 _EXAMPLES = {
     "distribution": "uniform(low=0, high=3)",
@@ -20,7 +21,7 @@ _EXAMPLES = {
 }
 
 
-def called(what: str, text: Any, functions: Mapping[str, Callable[..., Any]]) -> Any:
+def called(what: str, text: object, functions: Mapping[str, Callable[..., Result]]) -> Result:
     """Call a function with the literal arguments of a text, and return its result.
 
     Args:
@@ -47,8 +48,12 @@ def called(what: str, text: Any, functions: Mapping[str, Callable[..., Any]]) ->
 
 
 def call_of(
-    what: str, name: str, functions: Mapping[str, Callable[..., Any]], arguments: Sequence[Any], by_name: dict[str, Any]
-) -> Any:
+    what: str,
+    name: str,
+    functions: Mapping[str, Callable[..., Result]],
+    arguments: Sequence[object],
+    by_name: Mapping[str, object],
+) -> Result:
     """Call a function by name; raise a SweepError if it is unknown or does not accept the arguments."""
     if name not in functions:
         raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; for example {_EXAMPLES[what]}")

@@ -40,6 +40,18 @@ def test_rows_do_not_depend_on_where_steps_are_cut_in_other_runs(tmp_path: Path)
         assert digest_of([work.rows(i, i + 1)]) == digest_of([{name: x[i : i + 1] for name, x in whole.items()}]), i
 
 
+def test_the_order_of_remarks_does_not_depend_on_other_runs(tmp_path: Path) -> None:
+    """Chatter of a batch is sorted by its largest amplitude, which is of another joint in other runs."""
+    chatters = SCENE.replace('kind = "pd"\n', 'kind = "pd"\nperiod_s = 0.01\n').replace("= 0.05", "= 0.4")
+    vary = {"kd": sw.choice([[400.0, 20.0], [100.0, 50.0]]), "q0": sw.normal(mean=[0.4, 0.9], sd=0.2)}
+    sweep = swept(scene(tmp_path, chatters).parent, 12, vary=vary)
+    work = Work(sweep)
+    whole = work.rows(0, 12)
+    assert any("chatter u joint_1; chatter u joint_2" in remarks for remarks in whole["remarks"])
+    for i in range(12):
+        assert digest_of([work.rows(i, i + 1)]) == digest_of([{name: x[i : i + 1] for name, x in whole.items()}]), i
+
+
 def test_noise_is_numbered_by_the_run_not_by_its_place(tmp_path: Path) -> None:
     sweep = swept(scene(tmp_path, NOISY).parent, 20, vary={"kp": sw.choice([40.0])})
     rows = Work(sweep).rows(0, 20)

@@ -19,6 +19,7 @@ from robot_dyn.tools.sweeps import Work, begun, run_sweep
 from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
 from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
 from robot_dyn.tools.sweeps.specification import specification
+from robot_dyn.tools.sweeps.work import Stopped
 from tests.tools.sweeps.swept import VARY, digest, names_in, swept
 
 
@@ -93,6 +94,16 @@ def test_samples_of_a_chunk_take_no_more_than_they_may(tmp_path: Path, monkeypat
     monkeypatch.setattr(run_sweep, "_SAMPLE_BYTES", int(tiles * LANES * size))
     monkeypatch.setattr(run_sweep, "_LEAST_CHUNKS", 1)
     assert run_sweep.pilot(sweep) == int(tiles) * LANES
+
+
+def test_an_interrupted_pilot_is_an_interruption_and_leaves_no_folder(tmp_path: Path, monkeypatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise Stopped
+
+    monkeypatch.setattr(Work, "rows", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sw.run(swept(tmp_path, 20), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ class MotorBudget(Result):
         return [x.joint for x in self.joints if inf in (x.peak_limit, x.continuous_limit, x.speed_limit)]
 
     @property
-    def rows(self) -> Iterator[Mapping[str, Any]]:
+    def rows(self) -> Iterator[Mapping[str, object]]:
         """A row for each joint."""
         return (vars(joint) | {"unit": of_joint("N m", joint.type)} for joint in self.joints)
 

@@ -9,9 +9,9 @@ grid, q(s(t)) is a polynomial in each cell, of twice the degree of the path. [Si
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control import PiecewisePolynomial, polynomial
 from robot_dyn.foundations import PlanError
@@ -25,7 +25,7 @@ _FARTHEST = 1e100  # [rad] or [m]: squares do not overflow
 numbers = partial(checked_numbers, error=PlanError)
 
 
-def geometric_path(source: Any, joint_names: tuple[str, ...]) -> PiecewisePolynomial:
+def geometric_path(source: PiecewisePolynomial | ArrayLike, joint_names: tuple[str, ...]) -> PiecewisePolynomial:
     """Return the path through way points, (m, n), or the path of a piecewise polynomial.
 
     Raises:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn import Robot
 from robot_dyn.control import PiecewisePolynomial, Plan
@@ -26,14 +27,14 @@ _Segment = tuple[float, ...]  # of one joint: start time, position, velocity, ac
 
 def point_to_point(
     arm: Robot,
-    q0: Any,
-    q1: Any,
+    q0: ArrayLike,
+    q1: ArrayLike,
     *,
-    acceleration: Any,
-    jerk: Any,
-    velocity: Any = None,
-    v0: Any = 0.0,
-    v1: Any = 0.0,
+    acceleration: ArrayLike,
+    jerk: ArrayLike,
+    velocity: ArrayLike | None = None,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
     start_s: float = 0.0,
 ) -> Plan:
     """Plan the fastest motion from q0 to q1 under limits of velocity, acceleration and jerk.

@@ -89,7 +89,7 @@ def path(
     names = plant.dynamics.joint_names
     motion, judgement = _within(plant, limits, geometry)
     largest, at_limits = float(judgement.most.max()), float((judgement.most >= BINDS).mean())
-    moves = geometry.coefficients[:, 1:].any(axis=(0, 1))
+    moves = np.any(geometry.coefficients[:, 1:], axis=(0, 1))
     free = [name for i, name in enumerate(names) if moves[i] and np.isinf(limits.effort[i])]
     findings = [f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free]
     if at_limits < _ENOUGH:

@@ -74,7 +74,7 @@ def series(coefficients: Sequence[Ball], length: int) -> Any:
     return arb_series(list(coefficients[:length]), length)
 
 
-def coefficient(x: Any, k: int) -> Ball:
+def coefficient(x: arb | arb_series, k: int) -> Ball:
     """Return a coefficient of a power series, or of a number."""
     if isinstance(x, arb):
         return x if k == 0 else arb(0)
