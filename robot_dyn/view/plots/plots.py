@@ -60,7 +60,7 @@ def plot(
         limits: Effort limits, shape (n,), in [N m] or [N], inf for none. By default, the limits that acted in the run;
             for joints without one, the limits of its URDF.
         theme: "light" or "dark", for screens.
-        style: "paper" has thin lines, no title, and colours and dashes that can be told apart in greyscale.
+        style: "paper" has thin lines, no title, and colours and dashes that differ in greyscale.
         width_mm: Width, in [mm], from 80 to 1000.
         x: For rollouts, the column of their table on the x axis of a scatter; by default the first parameter that was
             swept.

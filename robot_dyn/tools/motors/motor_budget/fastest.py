@@ -42,7 +42,7 @@ class FastestMotion(Answer):
         before_s: Duration of the original motion, in [s].
         strokes: Number of movements from stop to stop.
         distance: Largest distance from the path, in [rad] or [m].
-        slowed: Factor λ on the duration that meets the continuous torque limits; 1 if none is needed, or no λ suffices.
+        slowed: Factor λ on the duration that meets the continuous torque limits; 1 if not needed, or if no λ suffices.
         no_pace: Message about the joint that exceeds its continuous torque limit at every pace; empty if a pace fits.
         given: True if the original motion fits, and no faster one that fits was found.
         fraction: Fraction of the peak torques that it may use.
