@@ -66,7 +66,7 @@ class Advice(Answer):
         method: The method of the setup.
         step_s: Its longest step, in [s]; 0 if the method chooses its steps.
         fastest: The fastest motion along the pilot run, with joint and source.
-        at: Time of that motion, in [s].
+        at_s: Time of that motion, in [s].
         limits: Longest stable step of the setup's method and of every other fixed-step method, in [s]; inf if every
             step is stable.
         period_s: Period of the sampled control, in [s]; 0 without sampled control.
@@ -84,7 +84,7 @@ class Advice(Answer):
     method: str
     step_s: float
     fastest: Fastest
-    at: float
+    at_s: float
     limits: dict[str, float]
     period_s: float
     longest_period_s: float
@@ -103,7 +103,7 @@ class Advice(Answer):
     def text(self) -> str:
         """Step, control period, growth over the run, error and fastest motion, a line for each."""
         parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
-        return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at:.3g} s"]))
+        return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at_s:.3g} s"]))
 
     def blocks(self) -> Iterator[Block]:
         yield from self.text.split("\n")
@@ -235,7 +235,7 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
         method=chosen.name,
         step_s=step,
         fastest=motion,
-        at=at,
+        at_s=at,
         limits=limits,
         period_s=period,
         longest_period_s=min((loop.longest_period(period) for loop in loops), default=inf),

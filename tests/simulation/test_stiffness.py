@@ -115,5 +115,5 @@ def test_rollouts_are_made_by_the_explicit_method_and_equations_name_one() -> No
     """Where a method is to be chosen: no run of many is another's, and a plain equation has nothing to look at."""
     chosen, named = (rd.rollouts(ARM, [STATE[:2]], duration_s=0.2, method=name) for name in ("auto", "DOP853"))
     np.testing.assert_array_equal(chosen.q, named.q)
-    with pytest.raises(QueryError, match="name 'DOP853' or 'Rodas5P' here"):
+    with pytest.raises(QueryError, match="use 'DOP853' or 'Rodas5P'"):
         rd.integrate.Adaptive("auto").solve(System(lambda t, y: -y, 1), 0.0, np.ones(2), 1.0)

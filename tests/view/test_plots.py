@@ -135,7 +135,7 @@ def test_units_are_those_of_each_joint(run, cart) -> None:
     assert [axes.get_ylabel() for axes in cells(figure, "q")] == ["q [m]", "q [rad]"]
     assert [axes.get_ylabel() for axes in cells(figure, "u")] == ["u [N]", "u [N m]"]
     assert {axes.get_xlabel() for axes in cells(figure, "v")} >= {"t [s]", "q [m]", "q [rad]"}
-    assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, about={})).axes}
+    assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, metadata={})).axes}
 
 
 def test_every_axis_has_a_unit(run) -> None:
@@ -240,7 +240,7 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     """No mathematics, no hidden labels, no letters that the font lacks; a long name keeps both its ends."""
     names = (r"$\frac", "_first", "a_b^{c$x$", "関節", "arm_" + "x" * 200 + "_end", "per%cent #1")
     sources = {r"_$\sum$": run.ledger.kinetic, "control": run.ledger.kinetic}
-    hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), about={})
+    hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), metadata={})
     plot(hostile).save(tmp_path / "names.png", dpi=40)  # warnings are errors
     titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
     assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]

@@ -95,7 +95,7 @@ def plot(
     with np.errstate(all="ignore"):  # the last samples of a run that diverged may overflow
         panels = [panel for name in parts or ("overview",) for panel in PLOTS[name](view)]
         end = run.outcome
-        title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
+        title = f"{run.metadata.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
         remarks = [text for text in (end.text, *remark_lines(run.remarks)) if text]
         return draw(panels, title, remarks, look, width, end.ending is Ending.DIVERGED)
 
@@ -111,7 +111,7 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
                 if parts:
                     raise
     first, *more = view.runs.summary.splitlines()
-    title = f"{view.runs.about.get('robot', 'runs')}: {first}"
+    title = f"{view.runs.metadata.get('robot', 'runs')}: {first}"
     return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.all()))
 
 
@@ -153,7 +153,7 @@ def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None
     """Return the view of a run, with joint types and limits from its URDF; without a URDF, both units are named."""
     columns = _columns(run, shown)
     try:
-        joints = structure_of(check(run.about.get("urdf", "").encode(), "the run's URDF"), Edits()).joints
+        joints = structure_of(check(run.metadata.get("urdf", "").encode(), "the run's URDF"), Edits()).joints
     except DescriptionError:
         joints = {}
     known = [joints.get(name) for name in run.joint_names]
