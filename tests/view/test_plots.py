@@ -72,7 +72,7 @@ def test_tracking_plots_the_tracking_error_with_its_rms(run, cart) -> None:
         ({"joints": ["elbow"]}, "no joint 'elbow'; nearest: elbow_joint"),
         ({"theme": "blue"}, "no theme"),
         ({"style": "papr"}, "no style 'papr'; nearest: paper"),
-        ({"style": "paper", "theme": "dark"}, "leave theme='dark' out"),
+        ({"style": "paper", "theme": "dark"}, "omit theme='dark'"),
         ({"limits": np.ones(2)}, r"limits must have shape \(6,\) or .*, got \(2,\)"),
         ({"width_mm": 10}, "width_mm must be at least 80, got 10"),
         ({"width_mm": 2e3}, "width_mm must be at most 1000, got 2000"),
@@ -93,7 +93,7 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
         assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
         assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
     assert all(box.height / figure.dpi * MM >= 8.4 for box in boxes)
-    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; name those to show"):
+    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; select some"):
         plot(many(run, MOST_JOINTS + 1), "joints")
 
 

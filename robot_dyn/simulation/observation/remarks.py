@@ -106,8 +106,8 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         "control loop unstable, deviations grow",
         (
             (
-                "{joint} by {growth} in each period of {period_s:.4g} s about the state at {start:.4g} s, by "
-                "{over_run} over the run",
+                "{joint} by a factor of {growth} in each period of {period_s:.4g} s about the state at {start:.4g} s, "
+                "by {over_run} over the run",
                 "{joint} with {value:.3g} per second about the state at {start:.4g} s",
             ),
             ", {gains}",

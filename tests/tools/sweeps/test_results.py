@@ -354,7 +354,7 @@ figures = {worst = "peak('tracking_error')"}
     assert (sweep.runs, sweep.seed, sweep.figures) == (70, 3, {"worst": sw.peak("tracking_error")})
     for text, said in (
         ('"my_module:f"', "would run code, but a scene is data"),
-        ("\"peak(__import__('os'))\"", "is not a name with numbers"),
+        ("\"peak(__import__('os'))\"", "is not a name with arguments"),
         ("\"peek('u')\"", "no figure 'peek'; nearest: peak"),
     ):
         path.write_text(SCENE + table.replace("\"peak('tracking_error')\"", text))
