@@ -205,7 +205,7 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
     for numbers, what, remedy in (
         (
             armature,
-            "a rotor inertia at the joint of {} kg m² or kg, which is not in M",
+            "a rotor inertia of {} kg m² (or kg, if prismatic) at the joint, which is not in M",
             'with_(armature="urdf") adds it',
         ),
         (
@@ -216,7 +216,7 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
     ):
         if numbers:
             largest = f"{'up to ' if len(numbers) > 1 else ''}{max(numbers.values()):.3g}"
-            yield f"{_joints(numbers)}: the file states for other programs {what.format(largest)}; {remedy}"
+            yield f"{_joints(numbers)}: for other programs, the file states {what.format(largest)}; {remedy}"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:

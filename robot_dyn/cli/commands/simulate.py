@@ -33,9 +33,9 @@ def simulate(
     The exit code is 1 if it diverges. Ctrl-C ends the run and keeps its samples.
 
     Options:
-        output (RUN.npz): Save the run: as .npz for replay, plot and diff; or as .csv, .parquet, .nc or .mcap.
+        output (RUN.npz): Save the run: as .npz for replay, plot and diff-runs; or as .csv, .parquet, .nc or .mcap.
         csv (TABLE.csv): Write the samples as a table.
-        accuracy (ERROR): Largest error of q to have, in rad and m; pilot runs choose the method.
+        accuracy (ERROR): Largest error of q allowed, in rad and m; pilot runs choose the method.
     """
     from robot_dyn.cli import report
     from robot_dyn.simulation.results.formats.save import TABLE, kinds
@@ -59,7 +59,7 @@ def simulate(
 
 @command(ASK)
 def explain(scene: Scene, /, as_json: Json = False) -> None:
-    """Say what a scene integrates, and where numbers came from."""
+    """Print what a scene integrates, and where its numbers come from."""
     show(rd.explain(Path(scene)), as_json=as_json)
 
 

@@ -43,7 +43,6 @@ class Sentence(NamedTuple):
     remedy: Parts = ()
 
 
-_REACHED = "{joint} {value:.4g} of {limit:.4g} {unit} at {at:.4g} s"
 _LASTED = "for {duration:.3g} s from {start:.4g} s"
 _SEEN = " (at samples and {instants} instants)"
 _ELSEWHERE = ", {elsewhere}"  # the numbers are of another run of the batch
@@ -66,8 +65,14 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.EFFORT_REACHED: Sentence(
         "effort limit reached", ("{joint} " + _LASTED + " ({bound:.4g} {unit})", _SEEN)
     ),
-    RemarkKind.STOP_REACHED: Sentence("joint stop reached", (_REACHED + ", " + _LASTED,)),
-    RemarkKind.BEYOND: Sentence("beyond the file's limits", (_REACHED, _SEEN), ("the plant does not enforce them",)),
+    RemarkKind.STOP_REACHED: Sentence(
+        "joint stop reached", ("{joint} {value:.4g} {unit} (stop at {limit:.4g}) at {at:.4g} s, " + _LASTED,)
+    ),
+    RemarkKind.BEYOND: Sentence(
+        "exceeds the file's limits",
+        ("{joint} reached {value:.4g} {unit} at {at:.4g} s (limit {limit:.4g})", _SEEN),
+        ("the plant does not enforce them",),
+    ),
     RemarkKind.COARSE: Sentence(
         "record too coarse",
         ("{quantity} of {joint} {value:.4g} {unit} near {at:.4g} s (sampled: {limit:.4g})",),
@@ -96,7 +101,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",
         ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", prefixed("; ", MOTION)),
-        ("use step_s={step_s}, or an implicit method",),
+        ("use step_s={step_s}, or method='Rodas5PFixed'",),
     ),
     RemarkKind.UNSTABLE: Sentence(
         "control loop unstable, deviations grow",

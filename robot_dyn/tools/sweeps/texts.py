@@ -51,7 +51,7 @@ def call_of(
 ) -> Any:
     """Call a function by name; raise a SweepError if it is unknown or does not accept the arguments."""
     if name not in functions:
-        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; such as {_EXAMPLES[what]}")
+        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; for example {_EXAMPLES[what]}")
     function = functions[name]
     try:
         bound = signature(function).bind(*arguments, **by_name)
