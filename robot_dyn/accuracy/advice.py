@@ -129,7 +129,7 @@ class Advice(Answer):
     def _of_step(self) -> str:
         limit = self.limits.get(self.method, inf)
         if not self.step_s:
-            return f"{self.method} controls its steps, which keeps them stable"
+            return f"{self.method} adapts its steps, which keeps the run stable"
         if not isfinite(limit):
             return f"step {self.step_s:.3g} s: stable; every step of {self.method} is stable here"
         if self.step_s <= limit:

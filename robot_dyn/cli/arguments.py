@@ -105,5 +105,6 @@ def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.nd
     if text is None:
         return np.zeros(len(joint_names))
     if len(words) != len(joint_names):
-        raise QueryError(f"{option} needs {len(joint_names)} numbers, got {len(words)}: {', '.join(joint_names)}")
+        numbers = f"{len(joint_names)} number{'s' if len(joint_names) > 1 else ''}"
+        raise QueryError(f"{option} needs {numbers} ({', '.join(joint_names)}), got {len(words)}")
     return np.array([number(option, word) for word in words])

@@ -40,7 +40,7 @@ Name = Annotated[
 ]
 Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
 Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
-Repeats = Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")]
+Repeats = Annotated[int, typer.Option(min=1, help="Largest number of timings of each, within the budget.")]
 Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/reference/json.md.")]
@@ -63,7 +63,7 @@ class FileOptions:
     Options:
         package_dir: Folder in which ROS packages are searched; may be repeated.
         xacro (NAME=VALUE): Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.
-        mass (LINK=KG): Mass of a link without inertia, which its shape gives; may be repeated.
+        mass (LINK=KG): Mass of a link without inertia; its shape gives the inertia; may be repeated.
         total_mass (KG): Mass of the robot, shared by links without inertia, from shapes.
         density (KG/M³): Density of links without inertia, from shapes.
         allow_overlap: Count what closed parts of a mesh share as often as they fill it.

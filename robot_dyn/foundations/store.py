@@ -268,7 +268,7 @@ def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
     except MemoryError:
         raise StoreError("it does not fit into memory") from None
     except Exception as error:  # zipfile and zlib do not document the types of their errors
-        raise StoreError(f"it is damaged or cut short ({type(error).__name__})") from None
+        raise StoreError(f"it is damaged, cut short or not a .npz file ({type(error).__name__})") from None
 
 
 def _array(file: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> np.ndarray:

@@ -106,13 +106,13 @@ def test_stiff_and_sampled_runs_are_made_by_their_methods() -> None:
 
 
 def test_what_chaos_denies_is_refused() -> None:
-    message = "cannot be had: runs with other steps differ by more than 0.1 rad or m; .* a shorter run"
+    message = "is not attainable: runs with other steps differ by more than 0.1 rad or m; .* a shorter run"
     with pytest.raises(AccuracyError, match=message):
         rd.simulate(ARM, [2.5, -0.7], duration_s=60.0, accuracy=1e-6, record_every_s=0.1)
 
 
 def test_the_best_that_is_named_can_be_had() -> None:
-    below = r"cannot be had: the estimated error is .* at DOP853's least tolerance, 2.2e-14; ask for \d"
+    below = r"is not attainable: the estimated error is .* at DOP853's smallest tolerance, 2.2e-14; use accuracy \d"
     with pytest.raises(AccuracyError, match=below) as caught:
         rd.simulate(ARM, START, duration_s=1.0, accuracy=1e-16)
     best = float(str(caught.value).rpartition("ask for ")[2])

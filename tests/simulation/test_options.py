@@ -104,8 +104,8 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.simulate(ARM, Q, rtol=1e-16), "rtol must be between"),
         (lambda: rd.simulate(ARM, Q, accuracy=1e-6, rtol=1e-8), "leave out method, rtol and atol"),
         (lambda: rd.simulate(ARM, plant=PLANT, q0=Q), "simulate: no option 'plant'"),
-        (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, \(2,\)"),
-        (lambda: rd.rollouts(ARM, method="RK4"), r"rollouts: give q0, the position at the start, \(2,\)"),
+        (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, of shape \(2,\)"),
+        (lambda: rd.rollouts(ARM, method="RK4"), r"rollouts: give q0, the position at the start, of shape \(2,\)"),
         (lambda: rd.rollouts(ARM, np.zeros((0, 2)), method="RK4"), "of one number of runs"),
         (
             lambda: rd.rollouts(ARM, Q, method="RK4", events=[rd.Event(lambda t, q, v: v[0])], cuts=False),

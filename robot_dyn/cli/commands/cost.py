@@ -33,15 +33,15 @@ def work_precision(
 ) -> None:
     """Show what each digit of a motion costs in time.
 
-    By method and program. Ctrl-C ends it and keeps its runs.
+    Results are listed by method and program. Ctrl-C ends it and keeps its runs.
 
     Options:
         what (SCENE.toml|ROBOT): A scene file, or a robot for a free swing.
         method (METHOD): Only this method; may be repeated; all by default.
         peers: Also run other installed programs that can simulate the motion.
-        q: Initial positions of a robot, same as in query; random by default.
-        v: Initial velocities of a robot; 0 by default.
-        duration (SECONDS): Duration of the motion of a robot; 1 by default.
+        q: Start of a robot, in the form of `query --q`; random by default.
+        v: Velocities at the start; 0 by default.
+        duration (SECONDS): Duration of the robot's motion; 1 by default.
     """
     paths = results.files(rd.accuracy.WorkPrecision, what)
     setup = _setup(what, q, v, duration, options)
@@ -79,18 +79,18 @@ def certify(
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
-    """Count the digits of M, C, N and dynamics that are true.
+    """Count the correct digits of M, C, N and the dynamics.
 
-    By program and numbers, with times.
+    Digits and times are listed by program and type of number.
 
     Options:
         samples: Number of random states.
-        seed: Of the random states.
+        seed: Seed of the random states.
         repeats: How often each query is timed.
-        q: A further state to examine, same as in query.
-        v: Its velocities; 0 by default.
-        a: Its accelerations, of inverse dynamics; 0 by default.
-        tau: Its torques, of forward dynamics; 0 by default.
+        q: Positions of a state to certify as well, in the form of `query --q`.
+        v: Velocities of this state; 0 by default.
+        a: Accelerations of this state, for inverse dynamics; 0 by default.
+        tau: Torques of this state, for forward dynamics; 0 by default.
     """
     paths = results.files(rd.accuracy.Certificate, robot)
     arm = options.load(robot)
@@ -105,7 +105,7 @@ def certify(
 def advise(scene: Scene, /, as_json: Json = False) -> None:
     """Check whether step and control period are short enough.
 
-    Also what error to expect. The exit code is 1 if they are not short enough.
+    It also estimates the error. The exit code is 1 if they are not short enough.
     """
     setup = rd.read_scene(scene)
     with bar(what="looking at the loop"):

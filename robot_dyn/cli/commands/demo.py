@@ -22,10 +22,10 @@ _BUDGET_S = 8.0  # compiling not counted, which happens once for a version of th
 def demo(output: str = "demo", force: Force = False) -> None:
     """Load, compare, simulate, replay and plot a real arm.
 
-    At the end it prints what 1e-8 rad takes here, by this library and by other programs that are installed.
+    At the end it prints how long this library and other installed programs take here for 1e-8 rad.
 
     Options:
-        output (FOLDER): Where its files go.
+        output (FOLDER): Folder for its files.
     """
     from robot_dyn.cli import report
     from robot_dyn.scene.scene import SCENE, SceneError

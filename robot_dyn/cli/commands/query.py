@@ -60,9 +60,10 @@ def query(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Ask for M, C, N, torques and accelerations at a state.
+    """Compute M, C, N, torques and accelerations at a state.
 
-    Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
+    A scene is evaluated at its start, with the actuation of its control. Joints held by dry friction or rigid stops
+    are listed.
 
     Options:
         what (ROBOT|SCENE.toml): A robot; or a scene file, with its robot, effects and start.

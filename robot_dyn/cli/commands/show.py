@@ -28,9 +28,9 @@ class PageOptions:
     """Options of a page: how it is drawn, and whether it is written or served.
 
     Options:
-        html (OUT.html): Write one file that needs no server, and end.
+        html (OUT.html): Write one file that needs no server, and exit.
         inertia: Draw each link's equivalent inertia box.
-        meshes: full, the triangles of their files, or coarse, for a smaller page.
+        meshes: full (all triangles of the files) or coarse (fewer, for a smaller page).
         port: Where to listen; a free one by default.
         open_: Open the page in your browser.
     """
@@ -86,7 +86,7 @@ SERVED = PageOptions()
 def show_(robot: Name, /, q: Positions = None, view: PageOptions = SERVED, options: RobotOptions = AS_STATED) -> None:
     """Show a robot in the browser, or as one HTML file.
 
-    The browser has it live on this machine until Ctrl-C.
+    A server on this machine runs until Ctrl-C.
     """
     file = view.file([robot])
     loaded = options.load(robot)
@@ -108,7 +108,7 @@ def replay(
 ) -> None:
     """Replay runs in the browser, or as one HTML file or a video.
 
-    The browser has them live on this machine until Ctrl-C.
+    A server on this machine runs until Ctrl-C.
 
     Options:
         runs (RUN.npz...): Run files; those after the first are drawn transparent.
@@ -122,8 +122,8 @@ def replay(
     film = None if video is None else _film(video, size or "1280x720", view, runs)
     if film is None and (dark or size is not None or fps is not None):
         raise QueryError(
-            "--dark, --size and --fps are of a video; add --video OUT.mp4, or leave them out: a page is dark where the"
-            " browser is"
+            "--dark, --size and --fps apply to a video only; add --video OUT.mp4, or remove them: a page follows the"
+            " dark mode of the browser"
         )
     page = rd.replay(*map(arguments.run, runs), frame=frame, package_dirs=package_dir or (), **view.look)
     if film is None:

@@ -33,7 +33,7 @@ def simulate(
     The exit code is 1 if the run diverges. Ctrl-C ends the run and keeps its samples.
 
     Options:
-        output (RUN.npz): Save the run: as .npz for replay, plot and diff; or as .csv, .parquet, .nc or .mcap.
+        output (RUN.npz): Save the run: as .npz for replay, plot and diff-runs; or as .csv, .parquet, .nc or .mcap.
         csv (TABLE.csv): Write the samples as a table.
         accuracy (ERROR): Largest acceptable error of q, in rad or m; pilot runs choose the method.
     """

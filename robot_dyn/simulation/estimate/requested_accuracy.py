@@ -186,7 +186,7 @@ def _refusal(best: _Try, requested: float, rtol: float) -> str:
         why = doubt.text  # its remedy is for a single run
     else:
         method = best.trial.statistics.method
-        least = f"{method}'s least tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
+        least = f"{method}'s smallest tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
         why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"
-    remedy = f"ask for {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "take a shorter run"
-    return f"accuracy {requested:.1e} cannot be had: {why}; {remedy}"
+    remedy = f"use accuracy {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "take a shorter run"
+    return f"accuracy {requested:.1e} is not attainable: {why}; {remedy}"

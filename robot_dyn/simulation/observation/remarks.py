@@ -43,7 +43,6 @@ class Sentence(NamedTuple):
     remedy: Parts = ()
 
 
-_REACHED = "{joint} {value:.4g} of {limit:.4g} {unit} at {at:.4g} s"
 _LASTED = "for {duration:.3g} s from {start:.4g} s"
 _SEEN = " (at samples and {instants} instants)"
 _ELSEWHERE = ", {elsewhere}"  # the numbers are of another run of the batch
@@ -100,7 +99,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",
         ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", prefixed("; ", MOTION)),
-        ("use step_s={step_s}, or an implicit method",),
+        ("use step_s={step_s}, or method='Rodas5PFixed'",),
     ),
     RemarkKind.UNSTABLE: Sentence(
         "control loop unstable, deviations grow",

@@ -143,7 +143,7 @@ def batch_of(
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
         shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in vary.items()}
         rows = f"q0 and v0 ({n},) or (B, {n}), values of vary (B,) or (B, …)"
-        raise QueryError(f"q0, v0 and vary must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
+        raise QueryError(f"q0, v0 and vary must have the same number of runs, B ≥ 1: {rows}; got {shapes}")
     B = counts.pop()
     q, v = (np.broadcast_to(x, (B, n)) for x in (q, v))
     batch = Batch(setup, q, v, sweep, recorded, None if numbers is None else _numbers(numbers, B))

@@ -70,7 +70,7 @@ def setup_of(caller: str, source: Setup | Plant | Dynamics, options: Mapping[str
         return replace(source, **_with_tolerances(options, source.method))
     plant = source if isinstance(source, Plant) else _plant(source)
     if "q0" not in options:
-        raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")
+        raise QueryError(f"{caller}: give q0, the position at the start, of shape ({plant.dynamics.n},)")
     return _latest_or_new(plant, options)
 
 

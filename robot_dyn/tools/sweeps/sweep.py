@@ -64,7 +64,8 @@ class Sweep(Answer, Value):
         set_(self, "vary", {name: _varied(name, x) for name, x in by_name("vary", self.vary, "kp").items()})
         if not self.vary:
             raise SweepError(
-                "vary: nothing varies; give distributions by name, such as {'kp': sw.uniform(low=1, high=2)}"
+                "vary: nothing varies; give distributions by name, for example {'kp': sw.uniform(low=1, high=2)},"
+                " on the command line --vary 'kp=uniform(low=1, high=2)'"
             )
         figures = by_name("figures", self.figures, "settling")
         if taken := sorted(figures.keys() & {*RESERVED, *self.columns}):

@@ -130,7 +130,7 @@ def tracking(view: View) -> list[Panel]:
     run = view.run
     if run.tracking_error is None:
         raise PlotError(
-            "the run has no tracking error, since it followed no reference; simulate with a controller that has one"
+            "the run has no tracking error, because it followed no reference; simulate with a controller that has one"
         )
     if run.desired is None:
         columns, units = [0, 1, 2], ["m"] * 3
