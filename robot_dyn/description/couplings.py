@@ -9,7 +9,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Numeral
 from robot_dyn.foundations.errors import OverflowedError
 from robot_dyn.foundations.validate import LEAST_EXACT, is_moderate
 from robot_dyn.foundations.values import Value
@@ -23,8 +23,8 @@ class Mimic:
     """A joint coupled to another: q = multiplier · q_source + offset, as literals."""
 
     source: str
-    multiplier: Any
-    offset: Any
+    multiplier: Numeral
+    offset: Numeral
 
 
 def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> tuple[str, Any, Any]:
@@ -140,7 +140,7 @@ class Couplings(Value):
             return J
         return J.dot(self.S) if J.ndim <= 2 else J @ self.S
 
-    def reduced(self, values: Any, axes: tuple[int | str, ...]) -> Any:
+    def reduced(self, values: Array, axes: tuple[int | str, ...]) -> Array:
         """Reduce a quantity of all joints to independent coordinates; "n" in `axes` marks joint axes of its shape."""
         if self.trivial or "n" not in axes:
             return values

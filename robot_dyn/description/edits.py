@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, TypedDict, Unpack, final
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, final
 
 import numpy as np
 
@@ -15,6 +15,12 @@ from robot_dyn.foundations.errors import EditError, nearest, shown
 from robot_dyn.foundations.signatures import takes, unchanged
 from robot_dyn.foundations.validate import instance, numbers
 from robot_dyn.foundations.values import several
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from robot_dyn.foundations.coefficients import CoefficientInput
+
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 
@@ -52,13 +58,13 @@ class Payload:
 class Changes(TypedDict, total=False):
     """Keyword arguments of `Robot.with_`."""
 
-    gravity: Any
+    gravity: ArrayLike
     lock: Mapping[str, float]
     payload: Payload | Iterable[Payload]
-    armature: Any
+    armature: CoefficientInput
     mass_scale: float
     masses: Mapping[str, float]
-    inertias: Mapping[str, Any]
+    inertias: Mapping[str, ArrayLike]
 
 
 takes_changes = takes(unchanged(Changes.__annotations__))
@@ -134,7 +140,7 @@ class Edits:
         return json.dumps(asdict(self))
 
 
-def by_joint(name_of_value: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:
+def by_joint(name_of_value: str, values: CoefficientInput, joint_names: tuple[str, ...]) -> dict[str, float]:
     """Return values by joint name from a scalar, an array (n,) or a mapping, which may omit joints.
 
     Raises:

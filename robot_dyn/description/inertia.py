@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -16,12 +16,16 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.spatial import hat, spatial_inertia
 from robot_dyn.foundations.validate import number, numbers, rows
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
 _SLACK = 1e-9  # relative to the largest moment: rounding of printed digits
 _LEVER_SLACK = 1e-12  # relative to m c² and to m (1 m)²: rounding of merged bodies
 _ROTATION_SLACK = 1e-6  # of RᵀR − 1: drift of an integrated R
 
 
-def rotation_matrix(R: Any) -> np.ndarray:
+def rotation_matrix(R: ArrayLike) -> np.ndarray:
     """Return R as float64 of shape (..., 3, 3); raise QueryError unless RᵀR = 1 and det R = 1."""
     array = rows("R", R, 3, 3)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -65,7 +69,7 @@ class MassProperties:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
-    def moved(self, R: Any, p: Any) -> MassProperties:
+    def moved(self, R: ArrayLike, p: ArrayLike) -> MassProperties:
         """Return the same body as seen from a frame in which its own frame has the placement g = (R, p).
 
             c' = R c + p,   I' = R I Rᵀ
@@ -80,7 +84,7 @@ class MassProperties:
         R, p = rotation_matrix(R), numbers("p", p, (3,))
         return MassProperties(self.mass, R @ self.com + p, R @ self.inertia @ R.T)
 
-    def about(self, point: Any) -> np.ndarray:
+    def about(self, point: ArrayLike) -> np.ndarray:
         """Return the inertia about a point of the body's frame, I + m d̂ᵀ d̂ with d = c − point; (3, 3), [kg m²].
 
         Source: the parallel-axis theorem; Featherstone 2008, §2.13.
@@ -108,7 +112,7 @@ def combined(bodies: Iterable[MassProperties]) -> MassProperties:
     return MassProperties(mass, com, sum((body.about(com) for body in bodies), np.zeros((3, 3))))
 
 
-def implausibility(mass: float, com: Any, inertia: Any) -> str | None:
+def implausibility(mass: float, com: np.ndarray, inertia: np.ndarray) -> str | None:
     """Return the reason why no body has this mass and inertia about its centre of mass; None if one has.
 
     Args:

@@ -7,7 +7,7 @@ Solids of uniform density have their centre of mass at the origin and their prin
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,12 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.spatial import hat
 from robot_dyn.foundations.validate import integer, number, numbers, rows
 
-Density = Callable[[np.ndarray], Any]
-Chart = Callable[[np.ndarray], tuple[Any, Any]]
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+Density = Callable[[np.ndarray], "ArrayLike"]
+Chart = Callable[[np.ndarray], tuple["ArrayLike", "ArrayLike"]]
 
 
 def box(mass: float, lx: float, ly: float, lz: float) -> MassProperties:
@@ -78,7 +82,7 @@ def sphere(mass: float, radius: float) -> MassProperties:
 
 @np.errstate(over="ignore", invalid="ignore")  # the checks below reject values that overflow
 def from_density(
-    density: Density, lower: Any, upper: Any, *, chart: Chart | None = None, points: int = 24
+    density: Density, lower: ArrayLike, upper: ArrayLike, *, chart: Chart | None = None, points: int = 24
 ) -> MassProperties:
     """Compute mass, centre of mass and inertia of a density field by Gauss–Legendre quadrature over a box.
 
@@ -120,7 +124,7 @@ def from_density(
     return MassProperties(mass, com, np.tensordot(dm, np.swapaxes(r, -1, -2) @ r, 1))
 
 
-def _nodes(lower: Any, upper: Any, points: int) -> tuple[np.ndarray, np.ndarray]:
+def _nodes(lower: ArrayLike, upper: ArrayLike, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes (N, 3) and weights (N,) of the product rule over a box."""
     lower, upper = numbers("lower", lower, (3,)), numbers("upper", upper, (3,))
     if not np.all(upper > lower):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +21,11 @@ from robot_dyn.foundations.errors import MissingTimeError, OverflowedError, Quer
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.foundations.validate import integer, rows
 
-Kinetic = Callable[[Any, Any, Any], Any]
-Potential = Callable[[Any, Any], Any]
+if TYPE_CHECKING:
+    import casadi as ca
+
+    Kinetic = Callable[[ca.SX, ca.SX, ca.SX], object]
+    Potential = Callable[[ca.SX, ca.SX], object]
 
 
 @final
@@ -42,7 +45,7 @@ class EulerLagrange:
     """
 
     n: int
-    kernels: Mapping[str, Any]
+    kernels: Mapping[str, ca.Function]
     timed: frozenset[str]
     no_coriolis: str
 
@@ -176,7 +179,9 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
     return EulerLagrange(n, kernels, timed, no_coriolis)
 
 
-def traced(name: str, function: Callable[..., Any], symbols: tuple[Any, ...], shape: tuple[int, int] = (1, 1)) -> Any:
+def traced(
+    name: str, function: Callable[..., object], symbols: tuple[ca.SX, ...], shape: tuple[int, int] = (1, 1)
+) -> ca.SX:
     """Return the expression that a user's function returns for CasADi symbols.
 
     Raises:
@@ -185,7 +190,7 @@ def traced(name: str, function: Callable[..., Any], symbols: tuple[Any, ...], sh
     import casadi as ca
 
     try:
-        value = function(*symbols)
+        value: Any = function(*symbols)
         value = ca.vertcat(*value) if isinstance(value, list | tuple) else ca.SX(value)
         kernel = ca.Function("traced", list(symbols), [value])
     except QueryError:

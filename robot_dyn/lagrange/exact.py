@@ -11,17 +11,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Arithmetic, Array, Ball, midpoint, radius
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Ball, Numeral, midpoint, radius
 from robot_dyn.foundations.errors import UndecidedError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
 from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+
+if TYPE_CHECKING:
+    from flint import arb
+    from numpy.typing import ArrayLike
+
 
 RESOLUTION = 10.0**-MOST_DIGITS
 _FIRST_BITS, _MOST_BITS = 128, 4096
@@ -39,13 +44,13 @@ class RoundedLiterals(Arithmetic):
     ball: Ball
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
 
-    def number(self, literal: Any) -> Any:
+    def number(self, literal: Numeral) -> arb:
         return self.ball.number(float(literal) if isinstance(literal, str) else literal)
 
     def scope(self) -> AbstractContextManager[None]:
         return self.ball.scope()
 
-    def asarray(self, values: Any) -> Array:
+    def asarray(self, values: object) -> Array:
         return self.ball.asarray(values)
 
     def finite(self, x: Array) -> np.ndarray:
@@ -112,7 +117,7 @@ class Truth:
     scale: Scale
     bits: int
 
-    def error(self, answer: Any) -> float:
+    def error(self, answer: ArrayLike) -> float:
         """Return a bound on the largest relative error of an answer (floats or balls); inf if not finite."""
         ball = Ball(2 * self.bits)
         with ball.scope():

@@ -9,16 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.errors import OverflowedError, QueryError
 from robot_dyn.foundations.validate import integer, number, numbers
-from robot_dyn.lagrange.euler_lagrange import EulerLagrange, Potential, euler_lagrange, traced
+from robot_dyn.lagrange.euler_lagrange import EulerLagrange, euler_lagrange, traced
 
-Positions = Callable[[Any, Any], Sequence[Any]]
+if TYPE_CHECKING:
+    import casadi as ca
+
+    from robot_dyn.lagrange.euler_lagrange import Potential
+
+    Positions = Callable[[ca.SX, ca.SX], Sequence[object]]
 
 
 @final
@@ -36,7 +41,7 @@ class GeneralizedForce:
 
     n: int
     count: int
-    kernels: dict[str, Any]
+    kernels: dict[str, ca.Function]
 
     def __call__(self, t: float, q: ArrayLike, forces: ArrayLike) -> np.ndarray:
         """Return Q_j = Σ_i F_i · ∂r_i/∂q_j, shape (n,); the virtual work Σ F_i · δr_i is Q · δq.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,10 @@ from robot_dyn.queries.batch import answered, into
 from robot_dyn.queries.dynamics import QUANTITIES, Axes, Dynamics, entry
 from robot_dyn.queries.quantity import Quantity
 
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike
+
+
 _MASS_MATRIX_DERIVATIVE = Quantity("mass_matrix_derivative", ("q",), ("n", "n", "n"))
 
 
@@ -41,14 +45,14 @@ class Lagrangian(Dynamics[Array], Parametrised):
     """
 
     robot: Described
-    dtype: Any = np.float64
+    dtype: DTypeLike | Arithmetic = np.float64
 
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.robot, "description", None), Description):
             raise QueryError(f"robot must be a Robot, for example rd.load('ur5'), got {shown(self.robot)}")
         _ = self.linkage
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return Lagrangian, (self.robot, self.dtype)
 
     @cached_property

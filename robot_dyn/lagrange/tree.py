@@ -14,6 +14,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description.couplings import Mimic
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
+from robot_dyn.foundations.arithmetic import Numeral
 
 
 class Described(Protocol):
@@ -35,8 +36,7 @@ class Described(Protocol):
         ...
 
 
-Literal = Any  # text of a decimal number, or a number from a user
-Triple = tuple[Literal, Literal, Literal]
+Triple = tuple[Numeral, Numeral, Numeral]
 _ZERO: Triple = ("0", "0", "0")
 
 
@@ -48,11 +48,11 @@ class Inertial:
     `moments` are Ixx, Ixy, Ixz, Iyy, Iyz, Izz; mass and moments are multiplied by `scale`.
     """
 
-    mass: Literal
-    moments: tuple[Literal, ...]
+    mass: Numeral
+    moments: tuple[Numeral, ...]
     xyz: Triple = _ZERO
     rpy: Triple = _ZERO
-    scale: Literal = "1"
+    scale: Numeral = "1"
 
 
 @final
@@ -84,8 +84,8 @@ class Joint:
     rpy: Triple
     axis: Triple
     mimic: Mimic | None = None
-    locked: Literal | None = None
-    armature: Literal = "0"
+    locked: Numeral | None = None
+    armature: Numeral = "0"
 
 
 @final
@@ -183,7 +183,7 @@ def _loaded(link: Link, edits: Edits) -> Link:
     return replace(link, inertials=tuple(more))
 
 
-def _moments(inertia: Any) -> tuple[Literal, ...]:
+def _moments(inertia: Any) -> tuple[Numeral, ...]:
     (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = inertia
     return Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 

@@ -25,7 +25,7 @@ Call = Callable[..., Any]
 class Scratch(threading.local):
     """Pinocchio's working memory, one instance per thread."""
 
-    def __init__(self, model: Any) -> None:
+    def __init__(self, model: pin.Model) -> None:
         self.data = model.createData()
 
 
@@ -56,7 +56,7 @@ def _regressor(built: Built) -> Call:
     model, names = built.model, list(built.model.names[1:])
     N, order = model.nv, [names.index(name) for name in built.body_names]
 
-    def regressor(data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
+    def regressor(data: pin.Data, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
         Y = pin.computeJointTorqueRegressor(model, data, q, v, a)
         return Y if in_order else Y.reshape(N, N, -1)[:, order].reshape(N, -1)
 
@@ -73,7 +73,7 @@ def _frame(built: Built, name: str) -> int:
 def _placement(built: Built, frame: str) -> Call:
     model, index = built.model, _frame(built, frame)
 
-    def placement(data: Any, q: ndarray) -> ndarray:
+    def placement(data: pin.Data, q: ndarray) -> ndarray:
         pin.forwardKinematics(model, data, q)
         return pin.updateFramePlacement(model, data, index).homogeneous
 
@@ -85,11 +85,11 @@ def _jacobian(built: Built, frame: str, expressed_in: str) -> Call:
     model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
     reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
 
-    def jacobian(data: Any, q: ndarray) -> ndarray:
+    def jacobian(data: pin.Data, q: ndarray) -> ndarray:
         J = pin.computeFrameJacobian(model, data, q, index, reference)
         return J if J.ndim == 2 else J.reshape(6, 1)  # Pinocchio returns a flat array for one joint
 
-    def aligned(data: Any, q: ndarray) -> ndarray:
+    def aligned(data: pin.Data, q: ndarray) -> ndarray:
         return _turned(_rotation(model, data, index, q), jacobian(data, q))
 
     return aligned if axes is Axes.WORLD_ALIGNED else jacobian
@@ -98,7 +98,7 @@ def _jacobian(built: Built, frame: str, expressed_in: str) -> Call:
 def _jacobian_rate(built: Built, frame: str, expressed_in: str) -> Call:
     model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
 
-    def jacobian_rate(data: Any, q: ndarray, v: ndarray) -> ndarray:
+    def jacobian_rate(data: pin.Data, q: ndarray, v: ndarray) -> ndarray:
         if axes is Axes.WORLD:
             pin.computeJointJacobiansTimeVariation(model, data, q, v)
             rate = pin.getFrameJacobianTimeVariation(model, data, index, pin.WORLD)
@@ -113,7 +113,7 @@ def _jacobian_rate(built: Built, frame: str, expressed_in: str) -> Call:
     return jacobian_rate
 
 
-def _rotation(model: Any, data: Any, frame: int, q: ndarray) -> ndarray:
+def _rotation(model: pin.Model, data: pin.Data, frame: int, q: ndarray) -> ndarray:
     """Return the rotation R from the axes of a frame to those of the base."""
     pin.forwardKinematics(model, data, q)
     return pin.updateFramePlacement(model, data, frame).rotation

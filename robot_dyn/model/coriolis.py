@@ -17,7 +17,7 @@ axes; it is used where a bound on its rounding error is small (`regrouped`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -46,19 +46,19 @@ class Coriolis:
     """
 
     bodies: Bodies = field(repr=False)
-    regrouped: Any = field(repr=False)
+    regrouped: pin.Model = field(repr=False)
     slides: tuple[tuple[int, float], ...]
     rounding: float
 
     @classmethod
-    def of(cls, model: Any, couplings: Couplings) -> Coriolis:
+    def of(cls, model: pin.Model, couplings: Couplings) -> Coriolis:
         """Return the Coriolis matrix of a model with these couplings."""
         with np.errstate(all="ignore"):  # overflowing masses give a NaN bound, which fails the test below
             near_base = regrouped(model)
             bound = rounding(model, near_base, couplings)
         return cls(Bodies.of(model), near_base if bound <= MOST_ROUNDING else None, slides(model), bound)
 
-    def matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    def matrix(self, data: pin.Data, q: ndarray, v: ndarray) -> ndarray:
         """Return C of the Christoffel symbols at one state, (N, N)."""
         if self.regrouped is None:
             return self.bodies.coriolis_matrix(data, q, v)
@@ -81,13 +81,13 @@ class Bodies:
         sums: Matrix that sums the columns after each joint, and those of all joints, (n, 2 n).
     """
 
-    model: Any
+    model: pin.Model
     inertia: ndarray
     wrench: ndarray
     sums: ndarray
 
     @classmethod
-    def of(cls, model: Any) -> Bodies:
+    def of(cls, model: pin.Model) -> Bodies:
         """Return the bodies of a model."""
         inertia = np.array([body.matrix() for body in model.inertias[1:]])
         of_brackets = (inertia[:, None] @ bracket(np.eye(6))).swapaxes(1, 2)
@@ -96,12 +96,12 @@ class Bodies:
         n = len(inertia)
         return cls(model, inertia, wrench, np.hstack((np.tri(n, k=-1), np.ones((n, n)))))
 
-    def jacobians(self, data: Any, q: ndarray) -> ndarray:
+    def jacobians(self, data: pin.Data, q: ndarray) -> ndarray:
         """Return J_b of each body at its frame, in body axes, (n, 6, n); columns of unrelated joints are 0."""
         n = len(self.inertia)
         return np.array([pin.computeJointJacobian(self.model, data, q, i + 1) for i in range(n)]).reshape(n, 6, n)
 
-    def coriolis_matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    def coriolis_matrix(self, data: pin.Data, q: ndarray, v: ndarray) -> ndarray:
         """Return C of the Christoffel symbols at one state, (n, n)."""
         J, n = self.jacobians(data, q), len(v)
         rows = J.reshape(6 * n, n)

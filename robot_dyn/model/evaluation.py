@@ -60,7 +60,7 @@ class Evaluation:
         if couplings.trivial:
             return call
 
-        def coupled(data: Any, q: ndarray, *rates: ndarray) -> Any:
+        def coupled(data: pin.Data, q: ndarray, *rates: ndarray) -> Any:
             full = call(data, couplings.position(q), *map(couplings.velocity, rates))
             return couplings.reduced(full, quantity.axes)
 
@@ -77,7 +77,7 @@ class Evaluation:
             return self._forward_dynamics(state, nan)
         return self._answered(name, state, nan, self._batched(name, *frame))
 
-    def _solved(self, data: Any, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
+    def _solved(self, data: pin.Data, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
         """Return forward dynamics at one state; on the fast path if joints are coupled and M is regular."""
         built, couplings = self.built, self.built.couplings
         if self.regularity.singular is None and not couplings.trivial:

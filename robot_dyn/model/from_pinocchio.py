@@ -33,7 +33,7 @@ _UNBOUNDED = float(UNBOUNDED)
 _UNIT_SLACK = 1e-12  # of an axis: rounding of normalisation
 
 
-def described(model: Any) -> tuple[Description, Edits]:
+def described(model: pin.Model) -> tuple[Description, Edits]:
     """Return the description of a `pinocchio.Model`, and gravity and armature as edits; see `Robot.from_pinocchio`."""
     if not isinstance(model, pin.Model):
         raise DescriptionError(f"from_pinocchio needs a pinocchio.Model, got {type(model).__name__}")
@@ -53,7 +53,7 @@ def described(model: Any) -> tuple[Description, Edits]:
 class _Writer:
     """Writer of the URDF of one model."""
 
-    def __init__(self, model: Any) -> None:
+    def __init__(self, model: pin.Model) -> None:
         self.model, self.source = model, f"pinocchio.Model {shorten(model.name)!r}" if model.name else "pinocchio.Model"
         self.findings: list[str] = []
         if np.any(model.gravity.angular):

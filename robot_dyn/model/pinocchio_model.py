@@ -38,7 +38,7 @@ class Built:
         description: Checked file, without the edits.
     """
 
-    model: Any
+    model: pin.Model
     couplings: Couplings
     joint_names: tuple[str, ...]
     description: Description
@@ -93,7 +93,7 @@ def build(description: Description, edits: Edits) -> Built:
     return Built(model, *_couplings(tuple(model.names[1:]), mimics), description)
 
 
-def state_edits(robot: Any, edits: Edits) -> None:
+def state_edits(robot: etree._Element, edits: Edits) -> None:
     """Replace masses and inertias of links in the file by those of the edits."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     with_mass = [name for name, inertial in links.items() if inertial is not None]
@@ -108,7 +108,7 @@ def state_edits(robot: Any, edits: Edits) -> None:
             links[name].find("inertia").set(f"i{'xyz'[i]}{'xyz'[j]}", repr(float(inertia[i][j])))
 
 
-def _unmark(model: Any) -> None:
+def _unmark(model: pin.Model) -> None:
     """Restore the names of the joints."""
     for i, name in enumerate(model.names):
         model.names[i] = name.removeprefix(_MARK)
@@ -117,12 +117,12 @@ def _unmark(model: Any) -> None:
             frame.name = frame.name.removeprefix(_MARK)
 
 
-def joint_ids(model: Any, mark: str = "") -> dict[str, int]:
+def joint_ids(model: pin.Model, mark: str = "") -> dict[str, int]:
     """Return the index of each joint by name, even of one called "universe"; the prefix `mark` is removed."""
     return {name.removeprefix(mark): i for i, name in enumerate(model.names) if i}
 
 
-def _apply(edits: Edits, model: Any) -> None:
+def _apply(edits: Edits, model: pin.Model) -> None:
     """Apply gravity, armature, mass scale and payloads to a model."""
     model.gravity = pin.Motion(np.array(edits.gravity), np.zeros(3))
     ids = joint_ids(model, _MARK)
@@ -142,7 +142,7 @@ def _apply(edits: Edits, model: Any) -> None:
         model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
 
 
-def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
+def _locked(model: pin.Model, edits: Edits, mimics: dict[str, Mimic]) -> Any:
     """Return the model without locked joints and the joints that mimic them."""
     values = dict(edits.lock)
     q, locked, ids = np.zeros(model.nq), [], joint_ids(model, _MARK)
@@ -165,6 +165,6 @@ def _couplings(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Coupl
     return Couplings(S, s0), independent
 
 
-def link_frames(model: Any) -> dict[str, int]:
+def link_frames(model: pin.Model) -> dict[str, int]:
     """Return the index of the frame of each link, by name."""
     return {frame.name: i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}

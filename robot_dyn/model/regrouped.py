@@ -16,7 +16,6 @@ after its mass is moved to its parents, only by D/r. Up to a few roundings of th
 from __future__ import annotations
 
 from math import inf
-from typing import Any
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -27,7 +26,7 @@ from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.urdf import UNBOUNDED
 
 
-def regrouped(model: Any) -> Any:
+def regrouped(model: pin.Model) -> pin.Model:
     """Return a model with the same C whose first joints are at the origin and whose distal bodies have little mass.
 
     A body at reach D has its centre of mass at p + r e, with p on the joint's axis and e normal to it. It is replaced
@@ -56,7 +55,7 @@ def regrouped(model: Any) -> Any:
     return model
 
 
-def joint_axes(model: Any) -> ndarray:
+def joint_axes(model: pin.Model) -> ndarray:
     """Return the twist of each joint in its own frame, (N, 6)."""
     axes, q = np.empty((model.nv, 6)), np.zeros(model.nq)
     for j in range(model.nv):
@@ -67,7 +66,7 @@ def joint_axes(model: Any) -> ndarray:
     return axes
 
 
-def moved(model: Any) -> ndarray:
+def moved(model: pin.Model) -> ndarray:
     """Return True where a body (row) is moved by a joint (column), (N, N)."""
     table = np.zeros((model.nv, model.nv), dtype=bool)
     for b in range(model.nv):
@@ -75,14 +74,14 @@ def moved(model: Any) -> ndarray:
     return table
 
 
-def slides(model: Any) -> tuple[tuple[int, float], ...]:
+def slides(model: pin.Model) -> tuple[tuple[int, float], ...]:
     """Return the index and largest |q| within its limits of each prismatic joint; inf without limits."""
     most = np.maximum(np.abs(model.lowerPositionLimit), np.abs(model.upperPositionLimit))
     most[most >= float(UNBOUNDED)] = inf
     return tuple((j, float(most[j])) for j, axis in enumerate(joint_axes(model)) if not axis[3:].any())
 
 
-def reach(model: Any) -> ndarray:
+def reach(model: pin.Model) -> ndarray:
     """Return the largest distance D of each joint from the world's origin, within prismatic limits, (N + 1,)."""
     D, slide = np.zeros(model.njoints), dict(slides(model))
     for j in range(1, model.njoints):
@@ -90,7 +89,7 @@ def reach(model: Any) -> ndarray:
     return D
 
 
-def least_inertia(model: Any, couplings: Couplings) -> ndarray:
+def least_inertia(model: pin.Model, couplings: Couplings) -> ndarray:
     """Return a lower bound of M_ii at every q, (n,): the joint's own body counts with its inertia about the axis.
 
     Later bodies count with their smallest principal moment, or for a prismatic joint with their mass. Bodies that
@@ -106,7 +105,7 @@ def least_inertia(model: Any, couplings: Couplings) -> ndarray:
     return model.armature @ S**2 + np.where(alone, (least * table) @ S**2, 0.0).sum(axis=0)
 
 
-def rounding(model: Any, regrouped: Any, couplings: Couplings) -> float:
+def rounding(model: pin.Model, regrouped: pin.Model, couplings: Couplings) -> float:
     """Return ε of the bound above; inf if some joint may have no inertia, or a prismatic joint has no limits."""
     least, D, table = least_inertia(model, couplings), reach(regrouped)[1:], moved(model)
     if not (np.all(least > 0) and np.isfinite(D).all()):

@@ -11,13 +11,17 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.description import Description
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.model.robot import Robot
+
+if TYPE_CHECKING:
+    from robot_dyn.control.controller import Controller
+
 
 # With fewer, the intended angle is a guess, and a comparison of implementations could detect the change.
 _LEAST_DECIMALS = 9
@@ -49,27 +53,27 @@ def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
     return (Robot(description, robot.edits) if changes else robot), changes
 
 
-def models_in_full(controller: Any, full: Callable[[Robot], Robot]) -> Any:
+def models_in_full(controller: Controller | None, full: Callable[[Robot], Robot]) -> Controller | None:
     """Return a controller whose models are completed by `full`; the controller itself if none changes."""
     models = {} if controller is None else controller.models
     full_models = {name: full(model) for name, model in models.items() if isinstance(model, Robot)}
     return with_values(controller, {name: robot for name, robot in full_models.items() if robot is not models[name]})
 
 
-def robot_of(dynamics: Any) -> Robot | None:
+def robot_of(dynamics: object) -> Robot | None:
     """Return the robot that defines a dynamics, with exact right angles; None if there is none."""
     robot = _described(dynamics)
     return None if robot is None else completed(robot)[0]
 
 
-def written_out(*dynamics: Any) -> str:
+def written_out(*dynamics: object) -> str:
     """Describe the right angles that machine code of these dynamics makes exact, in one sentence, or ""."""
     robots = [robot for item in dynamics if (robot := _described(item)) is not None]
     changes = tuple(dict.fromkeys(change for robot in robots for change in completed(robot)[1]))
     return _sentence(changes) if changes else ""
 
 
-def _described(dynamics: Any) -> Robot | None:
+def _described(dynamics: object) -> Robot | None:
     robot = getattr(dynamics, "robot", dynamics)
     return robot if isinstance(robot, Robot) and isinstance(robot.description, Description) else None
 

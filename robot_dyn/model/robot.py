@@ -245,7 +245,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return MappingProxyType(self.description.estimated)
 
     @cached_property
-    def model(self) -> Any:
+    def model(self) -> pin.Model:
         """The `pinocchio.Model` of all moving joints, including coupled ones. Do not modify it."""
         return self._built.model
 
@@ -331,7 +331,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return Robot(check(urdf, source)).announced()
 
     @staticmethod
-    def from_pinocchio(model: Any) -> Robot:
+    def from_pinocchio(model: pin.Model) -> Robot:
         """Return a robot from a `pinocchio.Model`, with its gravity and armature; warns like `load`.
 
         The model is written as a URDF and read like any other. An unbounded joint becomes one angle. A warning reports
@@ -411,7 +411,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             )
         _ = self._built  # raises errors now, not at the first query
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return Robot, (self.description, self.edits, self.answer_check)
 
     @cached_property

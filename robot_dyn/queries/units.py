@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from robot_dyn.foundations.coefficients import Coefficient, declared
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from robot_dyn.queries.dynamics import Dynamics
+
 
 _ROUNDING = 1e-12  # some thousand rounding units 2⁻⁵³, which sums of terms of that size may leave instead of 0
 _NONE = 1e9  # stops farther away count as none
@@ -36,7 +42,7 @@ def coefficient_unit(coefficient: Coefficient, joint_types: Iterable[str | None]
     return " or ".join(dict.fromkeys(of_joint(coefficient.unit, kind) for kind in kinds))
 
 
-def joint_types_of(dynamics: Any) -> tuple[str | None, ...]:
+def joint_types_of(dynamics: Dynamics) -> tuple[str | None, ...]:
     """Return the joint types of a dynamics' robot; None for each joint if it has no robot."""
     return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
 
@@ -48,7 +54,7 @@ def joint_units(quantity: str, joint_types: Iterable[str | None]) -> str:
     return both if both in of_joints else " or ".join(of_joints)
 
 
-def coefficient_texts(part: Any, joint_types: Sequence[str | None], signal: str = "signal") -> dict[str, str]:
+def coefficient_texts(part: object, joint_types: Sequence[str | None], signal: str = "signal") -> dict[str, str]:
     """Return the coefficients of a part, by name: symbol, value and unit, for example "b = 0.5 N m s/rad".
 
     `signal` is the unit of the signal through a block of a digital loop.
@@ -82,7 +88,7 @@ def format_duration(seconds: float) -> str:
     return f"{float(f'{seconds * 1e6:.2g}'):g} µs"
 
 
-def without_rounding(values: Any) -> np.ndarray:
+def without_rounding(values: ArrayLike) -> np.ndarray:
     """Return numbers for display, with 0 for −0 and for values below 1e-12 of the array's largest finite one.
 
     Where terms cancel, float64 leaves some units of 1e-16 of the terms; such a remainder is meaningless. Files and JSON
@@ -97,6 +103,6 @@ def without_rounding(values: Any) -> np.ndarray:
     return np.where(sizes <= least, 0.0, values)
 
 
-def numbers_row(numbers: Any) -> str:
+def numbers_row(numbers: ArrayLike) -> str:
     """Format the numbers of a vector in columns of equal width, with 0 for rounding residues."""
     return " ".join(f"{x:10.5g}" for x in without_rounding(numbers))

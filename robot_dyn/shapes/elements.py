@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from numpy import ndarray
 
 from robot_dyn.foundations.errors import shorten
@@ -20,7 +20,7 @@ LENGTHS = {
 }  # attributes of each shape, with their number of values
 
 
-def numbers(element: Any, key: str, count: int, default: str = "") -> tuple[float, ...]:
+def numbers(element: etree._Element, key: str, count: int, default: str = "") -> tuple[float, ...]:
     """Return the numbers of an attribute; raise MeshError unless they are `count` finite numbers."""
     text, values = element.get(key, default), ()
     with suppress(ValueError):
@@ -30,7 +30,7 @@ def numbers(element: Any, key: str, count: int, default: str = "") -> tuple[floa
     return values
 
 
-def pose(element: Any) -> ndarray:
+def pose(element: etree._Element) -> ndarray:
     """Return the placement (4, 4) of a shape in its link, from the first <origin>; raise MeshError if malformed."""
     origin = element.find("origin")
     if origin is None:
@@ -39,7 +39,7 @@ def pose(element: Any) -> ndarray:
     return homogeneous(rotation_rpy(rpy), xyz)
 
 
-def shape(element: Any) -> Any:
+def shape(element: etree._Element) -> etree._Element:
     """Return the box, cylinder, sphere or mesh of a <visual> or <collision>; raise MeshError if it has none."""
     geometry = element.find("geometry")
     if geometry is None or not len(geometry):
@@ -50,16 +50,16 @@ def shape(element: Any) -> Any:
     return geometric
 
 
-def is_empty(primitive: Any) -> bool:
+def is_empty(primitive: etree._Element) -> bool:
     """Return True if a length of a box, cylinder or sphere is 0; raise MeshError if one is not a number."""
     return 0.0 in _lengths(primitive)
 
 
-def _lengths(primitive: Any) -> tuple[float, ...]:
+def _lengths(primitive: etree._Element) -> tuple[float, ...]:
     return tuple(x for key, count in LENGTHS[primitive.tag].items() for x in numbers(primitive, key, count))
 
 
-def lengths(primitive: Any) -> tuple[float, ...]:
+def lengths(primitive: etree._Element) -> tuple[float, ...]:
     """Return the lengths of a box, cylinder or sphere, in [m]; raise MeshError unless all are positive."""
     values = _lengths(primitive)
     if min(values) < SMALLEST:

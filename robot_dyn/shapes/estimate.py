@@ -45,7 +45,7 @@ class Estimate:
     basis: str
     moments_only: bool = False
 
-    def write(self, link: Any) -> Any:
+    def write(self, link: etree._Element) -> etree._Element:
         """Write the estimate into the <link> of a document and return its <inertial>."""
         inertial = link.find("inertial") if self.moments_only else None
         if inertial is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.foundations.validate import number, truth
@@ -51,7 +51,7 @@ class Masses:
         if not masses and self.total is None and self.density is None:
             raise QueryError("inertias from shapes need a mass: give mass by link, total_mass or density")
 
-    def check_links(self, links: Mapping[str, Any], measured: Mapping[str, float]) -> None:
+    def check_links(self, links: Mapping[str, object], measured: Mapping[str, float]) -> None:
         """Raise QueryError for an unknown link, or one whose mass the file states; `measured` has these, in [kg]."""
         for link in self.by_link:
             if link not in links:

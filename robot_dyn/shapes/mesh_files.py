@@ -7,12 +7,15 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path, PureWindowsPath
 from stat import S_ISREG
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.foundations.errors import RobotDynError, shorten
+
+if TYPE_CHECKING:
+    from trimesh.resolvers import FilePathResolver
 
 MAX_BYTES = 64 * 2**20  # per mesh or texture; the largest in example-robot-data has 28 MiB
 MAX_NODES = 20_000  # of a scene, counting every instance
@@ -42,7 +45,7 @@ def bounded(path: Path) -> bytes:
         raise MeshError(f"cannot be read ({getattr(error, 'strerror', error)})") from None
 
 
-def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
+def beside(folder: Path, missing: list[str], anywhere: bool) -> FilePathResolver:
     """Return a resolver of files named by a mesh: regular files, `MAX_BYTES` in total; others go to `missing`."""
     from trimesh.resolvers import FilePathResolver
 
@@ -105,7 +108,7 @@ def checked_collada(data: bytes) -> etree._Element:
     return root
 
 
-def check_gltf(data: bytes, resolver: Any) -> None:
+def check_gltf(data: bytes, resolver: FilePathResolver) -> None:
     """Raise MeshError for files that trimesh would silently draw wrong, and for accessors larger than the file.
 
     For such accessors trimesh would allocate arrays of zeros.

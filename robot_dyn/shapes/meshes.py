@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
@@ -25,6 +25,11 @@ from numpy import ndarray
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.shapes.mesh_files import MeshError, beside, bounded, check_gltf, checked_collada
 from robot_dyn.shapes.triangles import Mesh, welded
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from PIL import Image
+
 
 MAX_PIXELS = 1024  # of a texture's longer side in the page
 FORMATS = ("stl", "dae", "obj", "ply", "glb", "gltf")
@@ -59,7 +64,7 @@ class Part:
 
 
 def read(
-    path: Path, scale: Any = (1.0, 1.0, 1.0), turned: frozenset[str] = frozenset({GLTF})
+    path: Path, scale: ArrayLike = (1.0, 1.0, 1.0), turned: frozenset[str] = frozenset({GLTF})
 ) -> tuple[tuple[Part, ...], tuple[str, ...]]:
     """Read the triangles of a mesh file, scaled; faces are flipped where the scale mirrors.
 
@@ -83,7 +88,7 @@ def read(
     return parts, tuple(dict.fromkeys(missing))
 
 
-def corners(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> ndarray:
+def corners(path: Path, scale: ArrayLike = (1.0, 1.0, 1.0)) -> ndarray:
     """Read the corners of the same triangles as `read`, with all digits of the file.
 
     Args:
@@ -158,7 +163,7 @@ def _logged(missing: list[str]) -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def png(picture: Any) -> bytes:
+def png(picture: bytes | Image.Image) -> bytes:
     """Convert a picture, as bytes or a Pillow image, to PNG of at most `MAX_PIXELS` a side; MeshError if damaged."""
     from PIL import Image
 

@@ -30,7 +30,7 @@ class Compiled:
     mujoco: Any
     model: Any
     path: Path
-    references: dict[str, tuple[Any, Any]]
+    references: dict[str, tuple[np.ndarray, np.ndarray]]
     warnings: tuple[str, ...]
 
     def name(self, kind: str, index: int) -> str:
@@ -43,7 +43,7 @@ class Compiled:
         bits = (int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
         return any(int(self.model.opt.disableflags) & bit for bit in bits)
 
-    def rotation(self, quaternion: Any) -> np.ndarray:
+    def rotation(self, quaternion: np.ndarray) -> np.ndarray:
         """Return the matrix (3, 3) of a quaternion (w, x, y, z)."""
         R = np.zeros(9)
         self.mujoco.mju_quat2Mat(R, quaternion / np.linalg.norm(quaternion))

@@ -32,7 +32,7 @@ class Shapes:
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.model, self.left_out = compiled, compiled.model, list[str]()
 
-    def draw(self, link: Any, body: int) -> None:
+    def draw(self, link: etree._Element, body: int) -> None:
         """Add the geoms of a body to its link."""
         first = int(self.model.body_geomadr[body])
         visible = [*filter(self.visible, range(first, first + int(self.model.body_geomnum[body])))]

@@ -34,9 +34,9 @@ class Described:
 
     path: Path
     package_dirs: tuple[Path, ...]
-    arguments: Mapping[str, Any] | None
+    arguments: Mapping[str, str | float | bool] | None
 
-    def expansion(self, arguments: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+    def expansion(self, arguments: Mapping[str, str | float | bool] | None) -> Mapping[str, str | float | bool] | None:
         """Return the xacro arguments, those of the user over the description's own; None for a URDF without any."""
         return arguments if self.arguments is None else {**self.arguments, **(arguments or {})}
 

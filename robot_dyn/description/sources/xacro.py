@@ -33,7 +33,9 @@ answer()
 """
 
 
-def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str | Path]) -> tuple[bytes, list[str]]:
+def expand(
+    path: Path, arguments: Mapping[str, str | float | bool], package_dirs: Iterable[str | Path]
+) -> tuple[bytes, list[str]]:
     """Expand a xacro file; return the URDF and the warnings of xacro.
 
     Args:
