@@ -65,7 +65,9 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.EFFORT_REACHED: Sentence(
         "effort limit reached", ("{joint} " + _LASTED + " ({bound:.4g} {unit})", _SEEN)
     ),
-    RemarkKind.STOP_REACHED: Sentence("joint stop reached", (_REACHED + ", " + _LASTED,)),
+    RemarkKind.STOP_REACHED: Sentence(
+        "joint stop reached", ("{joint} {value:.4g} {unit} (stop at {limit:.4g}) at {at:.4g} s, " + _LASTED,)
+    ),
     RemarkKind.BEYOND: Sentence(
         "exceeds limits of the file",
         ("{joint} reached {value:.4g} {unit} at {at:.4g} s (limit {limit:.4g})", _SEEN),
