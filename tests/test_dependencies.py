@@ -71,6 +71,8 @@ DEVELOPMENT = names(GROUPS["dev"])
 def test_what_is_imported_is_declared(folder: str, allowed: set[str]) -> None:
     """Every module comes from a distribution that pyproject.toml names, not from one that another brings along."""
     for module, path in imported(folder).items():
+        if module == "_typeshed":
+            continue  # stubs that come with every type checker, imported for it alone
         if module not in homes():  # not installed: by its own name
             assert normal(module) in allowed, f"{path} imports {module}, which nothing declares"
             continue

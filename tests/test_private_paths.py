@@ -61,11 +61,11 @@ def test_a_run_finds_its_meshes_from_its_own_folder(arm, tmp_path, runs: str) ->
 def test_a_run_far_from_the_urdf_finds_it_in_the_home_folder(arm, tmp_path, monkeypatch) -> None:
     """With only the root in common, the path starts at the home folder, whose name is not told."""
     monkeypatch.setenv("HOME", str(tmp_path / "secret"))
-    about = packed(run_of(arm).about, Path("/"))
-    assert about["source"] == "~/robots/arm.urdf"
-    assert packed(run_of(arm).about, tmp_path)["source"] == "~/robots/arm.urdf"  # what lies above is other people's
+    metadata = packed(run_of(arm).metadata, Path("/"))
+    assert metadata["source"] == "~/robots/arm.urdf"
+    assert packed(run_of(arm).metadata, tmp_path)["source"] == "~/robots/arm.urdf"  # what lies above is other people's
     monkeypatch.setenv("HOME", "/nowhere/else")
-    assert packed(run_of(arm).about, Path("/"))["source"] == "arm.urdf"
+    assert packed(run_of(arm).metadata, Path("/"))["source"] == "arm.urdf"
 
 
 def test_a_robot_of_the_catalog_is_known_by_its_file_name(tmp_path) -> None:
@@ -73,14 +73,14 @@ def test_a_robot_of_the_catalog_is_known_by_its_file_name(tmp_path) -> None:
     file = run_of("ur5").save(tmp_path / "run.npz")
     assert "site-packages" not in inside(file)
     again = rd.read(file)
-    assert Path(again.about["source"]).name == "ur5_robot.urdf"
+    assert Path(again.metadata["source"]).name == "ur5_robot.urdf"
     assert document_of((again,), (), None, False)["problems"] == []
 
 
 def test_a_run_read_again_is_the_same_robot(arm, tmp_path) -> None:
     run = run_of(arm)
     again = rd.read(run.save(tmp_path / "run.npz"))
-    assert again.about == run.about | {"file": "run.npz"}
+    assert again.metadata == run.metadata | {"file": "run.npz"}
     assert robot_of(again).description == robot_of(run).description
 
 

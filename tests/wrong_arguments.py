@@ -216,7 +216,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.Samples([0.0, 0.5, 1.0], points).at, t=0.1),
         call(rd.Setup, plant=plant, q0=q, v0=v, duration_s=0.1, controller=rd.control.PD(hold, kp=1.0, kd=1.0),
             method=rd.integrate.method("RK4"), step_s=1e-3, record_every_s=0.01, estimate_error=True,
-            about={"note": "text"}, engine="interpreted"),
+            metadata={"note": "text"}, engine="interpreted"),
         call(rd.effects.Layer, joint=1, width=0.01, level=0.5, of_velocity=True),
         call(rd.effects.Threshold, joint=1, level=0.5, name="stop", rising="touched", falling="left",
             of_velocity=True),

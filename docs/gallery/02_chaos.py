@@ -7,7 +7,7 @@ import robot_dyn as rd
 
 arm = rd.load("planar_2r")
 first, second = (
-    rd.simulate(arm, q0=[apart, 0.0], duration_s=10.0, record_every_s=0.01, about={"start": f"{apart:g} rad"})
+    rd.simulate(arm, q0=[apart, 0.0], duration_s=10.0, record_every_s=0.01, metadata={"start": f"{apart:g} rad"})
     for apart in (0.0, 1e-6)
 )
 page = rd.replay(first, second, frame="tip")

@@ -66,7 +66,7 @@ class Advice(Answer):
         method: The method of the setup.
         step_s: Its longest step, in [s]; 0 if the method chooses its steps.
         fastest: The fastest motion along the pilot run, with joint and source.
-        at: Time of that motion, in [s].
+        at_s: Time of that motion, in [s].
         limits: Longest stable step of the setup's method and of every other fixed-step method, in [s]; inf if every
             step is stable.
         period_s: Period of the sampled control, in [s]; 0 without sampled control.
@@ -84,7 +84,7 @@ class Advice(Answer):
     method: str
     step_s: float
     fastest: Fastest
-    at: float
+    at_s: float
     limits: dict[str, float]
     period_s: float
     longest_period_s: float
@@ -103,7 +103,7 @@ class Advice(Answer):
     def text(self) -> str:
         """Step, control period, growth over the run, error and fastest motion, a line for each."""
         parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
-        return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at:.3g} s"]))
+        return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at_s:.3g} s"]))
 
     def blocks(self) -> Iterator[Block]:
         yield from self.text.split("\n")
@@ -145,6 +145,7 @@ class Advice(Answer):
         if not self.period_s:
             return
         limit, unstable = self.longest_period_s, self.at_period is Stability.UNSTABLE
+        marginal = self.at_period is Stability.MARGINAL
         if unstable and not limit:
             verdict = f"; no period is stable: use {remedy(self.grows_anyway)}"
         elif unstable:
@@ -153,8 +154,12 @@ class Advice(Answer):
             verdict = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
         else:
             verdict = f"; the loop is stable up to {limit:.3g} s" if isfinite(limit) else "; every period is stable"
-        marginal = ", some deviations neither decay nor grow" * (self.at_period is Stability.MARGINAL)
-        yield f"control period {self.period_s:.3g} s: {self.at_period}{marginal}{verdict}"
+        if marginal and self.period_s <= limit:
+            verdict = (
+                f"; none grows up to a period of {limit:.3g} s" if isfinite(limit) else "; none grows at any period"
+            )
+        cause = ", some deviations neither decay nor grow, for example of a joint held by dry friction" * marginal
+        yield f"control period {self.period_s:.3g} s: {self.at_period}{cause}{verdict}"
 
     def _of_growth(self) -> Iterator[str]:
         if not self.stable:
@@ -230,7 +235,7 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
         method=chosen.name,
         step_s=step,
         fastest=motion,
-        at=at,
+        at_s=at,
         limits=limits,
         period_s=period,
         longest_period_s=min((loop.longest_period(period) for loop in loops), default=inf),

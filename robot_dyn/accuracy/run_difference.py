@@ -37,7 +37,7 @@ class JointDifference:
         unit: Unit of `rms` and `largest`.
         rms: Root mean square over the common time; nan if one run did not record the quantity.
         largest: Largest absolute value.
-        at: Time of the largest value, in [s].
+        at_s: Time of the largest value, in [s].
     """
 
     joint: str
@@ -45,7 +45,7 @@ class JointDifference:
     unit: str
     rms: float
     largest: float
-    at: float
+    at_s: float
 
 
 @final
@@ -57,13 +57,13 @@ class RunDifference(Result):
         robot: Name of the robot.
         names: Names of the two runs.
         joints: Rms and largest difference of q, v and u by joint.
-        start, end: Limits of the time that both runs cover, in [s].
+        start_s, end_s: Limits of the time that both runs cover, in [s].
         samples: Number of times at which the runs are compared.
         common: Number of these times at which both runs have a sample; at the others one run is interpolated in q.
-        fraction: Fraction of the time from start to end that was compared.
+        fraction: Fraction of the time from start_s to end_s that was compared.
         interpolation: Largest interpolation error that is allowed for, in the unit of q; 0 without interpolation.
-        parted: First time at which q differs by more than the errors of the runs, in [s]; None if it never does.
-        judged_until: Time up to which the errors of both runs are known, in [s].
+        parted_s: First time at which q differs by more than the errors of the runs, in [s]; None if it never does.
+        judged_until_s: Time up to which the errors of both runs are known, in [s].
         bound: The threshold beyond which the runs part, in words.
         settings: The settings that differ.
         left_out: Notes on everything that was not compared.
@@ -73,18 +73,18 @@ class RunDifference(Result):
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.run_difference_figure"
-    columns: ClassVar[tuple[str, ...]] = ("joint", "quantity", "unit", "rms", "largest", "at")
+    columns: ClassVar[tuple[str, ...]] = ("joint", "quantity", "unit", "rms", "largest", "at_s")
     robot: str
     names: tuple[str, str]
     joints: tuple[JointDifference, ...]
-    start: float
-    end: float
+    start_s: float
+    end_s: float
     samples: int
     common: int
     fraction: float
     interpolation: float
-    parted: float | None
-    judged_until: float
+    parted_s: float | None
+    judged_until_s: float
     bound: str
     settings: tuple[DifferingSetting, ...]
     left_out: tuple[str, ...]
@@ -96,11 +96,15 @@ class RunDifference(Result):
     def sentence(self) -> str:
         """One sentence about whether and when the runs part."""
         a, b = self.names
-        if self.parted is not None:
-            return f"{a} and {b} part at t = {self.parted:.4g} s: q differs by more than {self.bound}"
+        if self.parted_s is not None:
+            return f"{a} and {b} part at t = {self.parted_s:.4g} s: q differs by more than {self.bound}"
         if not self.is_conclusive:
             return f"{a} and {b} were compared over {self.fraction:.0%} of the time only: record both at the same times"
-        end = "" if self.judged_until >= self.end else f" up to t = {self.judged_until:.4g} s, where an estimate ends"
+        end = (
+            ""
+            if self.judged_until_s >= self.end_s
+            else f" up to t = {self.judged_until_s:.4g} s, where an estimate ends"
+        )
         if not any(joint.largest > 0 for joint in self.joints):
             return f"{a} and {b} are equal at all {self.samples} times"
         return f"{a} and {b} do not part{end}: q never differs by more than {self.bound}"
@@ -119,10 +123,10 @@ class RunDifference(Result):
         between = self.samples - self.common
         where = f"{self.common} common samples; q between samples at {between}" if between else "common samples"
         yield (
-            f"b − a, {self.start:g} to {self.end:g} s, at {self.samples} times ({where}),"
+            f"b − a, {self.start_s:g} to {self.end_s:g} s, at {self.samples} times ({where}),"
             f" {self.fraction:.0%} of the time:"
         )
-        rows = tuple((row.joint, f"{row.quantity} [{row.unit}]", row.rms, row.largest, row.at) for row in self.joints)
+        rows = tuple((row.joint, f"{row.quantity} [{row.unit}]", row.rms, row.largest, row.at_s) for row in self.joints)
         yield Table(("joint", "quantity", "rms", "largest", "at t [s]"), rows, digits=3)
         yield ""
         if self.settings:
@@ -163,17 +167,17 @@ def diff_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERA
     if differences.interpolation > 0:
         bound += f" and {differences.interpolation:.1g} {unit_of_q} of interpolation"
     return RunDifference(
-        robot=a.about.get("robot", ""),
+        robot=a.metadata.get("robot", ""),
         names=(first, second),
         joints=tuple(_joint_differences(differences, types)),
-        start=differences.start,
-        end=differences.end,
+        start_s=differences.start_s,
+        end_s=differences.end_s,
         samples=len(differences.t),
         common=int(differences.is_common.sum()),
         fraction=differences.fraction,
         interpolation=differences.interpolation,
-        parted=differences.parted,
-        judged_until=differences.judged_until,
+        parted_s=differences.parted_s,
+        judged_until_s=differences.judged_until_s,
         bound=bound,
         settings=differing_settings(a, b),
         left_out=(*left_out, *unknown_settings(a, b)),
@@ -221,5 +225,5 @@ def _unshared(a: TrajectoryData, b: TrajectoryData) -> Iterator[tuple[str, float
 
 
 def _versions(run: TrajectoryData) -> dict[str, str]:
-    pairs = (part.partition(" ") for part in run.about.get("versions", "").split(", ") if part)
+    pairs = (part.partition(" ") for part in run.metadata.get("versions", "").split(", ") if part)
     return {name: version for name, _, version in pairs}

@@ -77,8 +77,8 @@ def _draw_difference(axes: Axes, result: RunDifference, i: int, unit_of_q: str, 
     bound = np.where(difference.bound <= 1.5 * size, difference.bound, np.nan)  # a far bound would flatten the curve
     for side in (1, -1):
         axes.plot(difference.t, side * bound, ":", color=colours["lines"][3], linewidth=1)
-    if result.parted is not None:
-        axes.axvline(result.parted, color=colours["ink"], linewidth=0.6, linestyle=":")
+    if result.parted_s is not None:
+        axes.axvline(result.parted_s, color=colours["ink"], linewidth=0.6, linestyle=":")
     axes.ticklabel_format(axis="y", scilimits=(-3, 4))
     axes.yaxis.get_offset_text().set(color=colours["ink"], fontsize=7)
 

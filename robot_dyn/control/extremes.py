@@ -23,8 +23,8 @@ class Extremes(NamedTuple):
 
     least: np.ndarray
     greatest: np.ndarray
-    at_least: np.ndarray
-    at_greatest: np.ndarray
+    least_at_s: np.ndarray
+    greatest_at_s: np.ndarray
 
     @property
     def largest(self) -> np.ndarray:

@@ -84,8 +84,8 @@ class Comparison(Answer):
 
     def blocks(self) -> Iterator[Block]:
         agreed = f"{sum(x.ok for x in self.agreements)} of {len(self.agreements)} quantities agree"
-        yield f"{self.robot}: Pinocchio and the own Lagrangian at {self.samples} random states: {agreed}"
-        headings = ("quantity", "worst error", "allowed", "where", "Pinocchio", "own")
+        yield f"{self.robot}: Pinocchio and the independent Lagrangian at {self.samples} random states: {agreed}"
+        headings = ("quantity", "worst error", "allowed", "where", "Pinocchio", "Lagrangian")
         yield Table(headings, tuple(map(_row, self.agreements)), right=(*headings[1:3], *headings[4:]))
         yield from self.notes
         worst = self.worst

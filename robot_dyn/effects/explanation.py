@@ -99,7 +99,7 @@ class Explanation(Answer):
                 yield f"    as it acts: {'; '.join(effect.coefficients)}"
         if self.absent:
             yield ""
-            yield "not simulated, since nothing names it:"
+            yield "not simulated, because it was not named:"
             yield f"  {', '.join(self.absent)}"
         if self.absent_of_control:
             yield f"  of the control: {', '.join(self.absent_of_control)}"

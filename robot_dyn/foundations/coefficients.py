@@ -37,7 +37,9 @@ class Jointed(Protocol):
     """An arm with named joints."""
 
     @property
-    def joint_names(self) -> tuple[str, ...]: ...
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of its joints, in the order of q."""
+        ...
 
 
 class CoefficientField(Protocol):

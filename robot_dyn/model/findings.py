@@ -205,18 +205,18 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
     for numbers, what, remedy in (
         (
             armature,
-            "a rotor inertia at the joint of {} kg m² or kg, which is not in M",
+            "a reflected rotor inertia of {} kg m² (kg if prismatic), which M does not contain",
             'with_(armature="urdf") adds it',
         ),
         (
             stiffness,
-            "a spring of {} N m/rad or N/m, which does not act",
+            "a spring of {} N m/rad (N/m if prismatic), which does not act",
             'the effect Spring("urdf", rest="urdf") adds it',
         ),
     ):
         if numbers:
             largest = f"{'up to ' if len(numbers) > 1 else ''}{max(numbers.values()):.3g}"
-            yield f"{_joints(numbers)}: the file states for other programs {what.format(largest)}; {remedy}"
+            yield f"{_joints(numbers)}: the file states, for other programs only, {what.format(largest)}; {remedy}"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:

@@ -142,7 +142,7 @@ class Scene(Part):
                     raise wrong_key(place, f"{kind} is named {count} times, but only the last would act; keep one")
         return self
 
-    def setup(self, folder: Path, about: dict[str, str]) -> Setup:
+    def setup(self, folder: Path, metadata: dict[str, str]) -> Setup:
         """Return the setup of the scene; paths are relative to `folder`."""
         with part("robot"):
             file = folder / self.robot
@@ -183,7 +183,7 @@ class Scene(Part):
                 step_s=step_s,
                 record_every_s=self.record_every_s,
                 estimate_error=self.estimate_error,
-                about=about,
+                metadata=metadata,
                 engine=self.engine,
                 accuracy=self.accuracy,
             )

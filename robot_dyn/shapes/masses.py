@@ -89,6 +89,6 @@ class Masses:
                     f"total_mass of {self.total:g} kg leaves nothing to share: {stated:g} kg are stated; correct it"
                 )
             volume = sum(shape.hull.mass for shape in others.values())
-            origin = f"its share, by volume, of a total of {self.total:g} kg: {left / volume:.4g} kg/m³ of its hull"
+            origin = f"by its share of hull volume in a total of {self.total:g} kg: {left / volume:.4g} kg/m³"
             result |= {link: (left * shape.hull.mass / volume, origin) for link, shape in others.items()}
         return result

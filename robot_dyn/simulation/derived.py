@@ -105,7 +105,7 @@ class Results:
         return explained(outcome, self.setup, self._of_control) if outcome.ending is Ending.DIVERGED else outcome
 
     @property
-    def about(self) -> dict[str, str]:
+    def metadata(self) -> dict[str, str]:
         """Texts: origin, settings, changes by machine code, and the texts of the setup."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
         texts = frame_of(self.setup) | rotors_of(self.setup) | settings_text(self.setup)

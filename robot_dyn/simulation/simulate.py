@@ -59,8 +59,8 @@ def simulate(
         on_progress: Called with the time reached, in [s], at each step, and with the time of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, method, step_s,
-            record_every_s, estimate_error, about, engine, events and accuracy. `rtol` and `atol` are the tolerances of
-            an adaptive method, 1e-10 and 1e-12 by default.
+            record_every_s, estimate_error, metadata, engine, events and accuracy. `rtol` and `atol` are the tolerances
+            of an adaptive method, 1e-10 and 1e-12 by default.
 
     Raises:
         QueryError: If the setup is not allowed, if a method of fixed step is given `rtol` or `atol`, or if the record
@@ -90,7 +90,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
     recording, error = _estimated(ran, runner)
     estimated = perf_counter()
     results = Results(
-        ran.setup, recording, ran.observer, error, dict(setup.about), ran.engine.exact_right_angles, ran.remarks
+        ran.setup, recording, ran.observer, error, dict(setup.metadata), ran.engine.exact_right_angles, ran.remarks
     )
     attributes: dict[str, Any] = {
         "joint_names": setup.plant.dynamics.joint_names,

@@ -95,7 +95,7 @@ def document_of(
     for item in shown:
         run, stage, start = item.run, item.stage, len(page.notes)
         page.draw(stage, item.drawing, item.keys)
-        traced = frame if frame in stage.linkage.links else run.about.get("frame") or stage.tip  # of another robot
+        traced = frame if frame in stage.linkage.links else run.metadata.get("frame") or stage.tip  # of another robot
         stage.link_path(traced)  # raises if there is none
         frames, note = draw_paths(page.canvas, stage, item.motion, radius, traced)
         page.paths[stage.root] = {"frames": frames, "shown": traced}

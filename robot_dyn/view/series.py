@@ -88,7 +88,7 @@ def effort_limits(run: TrajectoryData, stated: np.ndarray) -> np.ndarray:
         stated: Limits of the file, (n,).
     """
     acting = np.full(len(stated), np.inf)
-    for name, text in json.loads(run.about.get("settings", "{}")).items():
+    for name, text in json.loads(run.metadata.get("settings", "{}")).items():
         if name.partition(" (")[0] in ("effort_limit.limit", "control.effort_limit") and "numbers" not in text:
             acting = np.minimum(acting, [float(x) for x in re.findall(r"inf|\d[\d.e+-]*", text)])
     return np.where(np.isfinite(acting), acting, stated)
@@ -126,8 +126,8 @@ def _energy(run: TrajectoryData) -> Columns:
 def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
     """Positions of a run less those of the first, and when they part."""
     found = difference(a, b)
-    if found.parted is not None:
-        at = f": they part at t = {found.parted:.4g} s"
+    if found.parted_s is not None:
+        at = f": they part at t = {found.parted_s:.4g} s"
     elif found.is_conclusive:
         at = ": they do not part"
     else:

@@ -271,7 +271,7 @@ def rollouts_values(runs: Any) -> tuple[Values, Texts]:
     """Return the numbers and the texts of a batch that are compared."""
     values = {name: getattr(runs, name) for name in ("t", "q", "v", "u", "kinetic", "potential")}
     values |= {f"work of {name}": x for name, x in sorted((runs.work or {}).items())}
-    values |= {"end": runs.ended}
+    values |= {"end": runs.ended_s}
     if runs.rms_tracking_error is not None:
         values["tracking error"] = runs.rms_tracking_error
     remarks = sorted((str(x.kind), x.joint, x.quantity, sorted(x.runs)) for x in runs.remarks)

@@ -52,19 +52,19 @@ def test_two_payloads_differ_by_the_closed_form() -> None:
     for each, x, y in zip(found.joints[:2], motion(a, t), motion(b, t), strict=True):
         assert each.rms == pytest.approx(over_time(t, y - x), rel=1e-8)
         assert each.largest == pytest.approx(np.abs(y - x).max(), rel=1e-8)
-        assert each.at == pytest.approx(t[np.abs(y - x).argmax()])
+        assert each.at_s == pytest.approx(t[np.abs(y - x).argmax()])
     assert [each.quantity for each in found.joints] == ["q", "v", "u"] and found.common == found.samples
-    assert found.samples == 51 and (found.start, found.end) == (0.0, DURATION)
+    assert found.samples == 51 and (found.start_s, found.end_s) == (0.0, DURATION)
     (setting,) = found.settings
     assert (setting.name, setting.a, setting.b) == ("payload on rod", "1 kg at 0, 0, -0.3 m", "2.5 kg at 0, 0, -0.3 m")
-    assert found.parted == pytest.approx(0.01) and "part at t = 0.01 s" in repr(found)
+    assert found.parted_s == pytest.approx(0.01) and "part at t = 0.01 s" in repr(found)
 
 
 def test_a_run_does_not_differ_from_itself() -> None:
     run = coasting(loaded(1.0))
     found = rd.diff_runs(run, coasting(loaded(1.0)))
     assert all(each.rms == each.largest == 0 for each in found.joints)
-    assert found.parted is None and found.settings == () and found.left_out == ()
+    assert found.parted_s is None and found.settings == () and found.left_out == ()
     assert "are equal at all 51 times" in found.sentence and "no setting differs" in repr(found)
 
 
@@ -76,9 +76,9 @@ def test_a_known_shift_is_found_with_its_time() -> None:
     found = rd.diff_runs(run, replace(run, q=run.q + np.outer(bump, [0, 1])))
     first, _, _, second, *_ = found.joints
     assert (first.rms, first.largest) == (0.0, 0.0)
-    assert second.largest == pytest.approx(2 * shift) and second.at == pytest.approx(0.4)
+    assert second.largest == pytest.approx(2 * shift) and second.at_s == pytest.approx(0.4)
     assert second.rms == pytest.approx(over_time(run.t, bump), rel=1e-9)
-    assert found.parted == pytest.approx(0.3)
+    assert found.parted_s == pytest.approx(0.3)
 
 
 def test_one_motion_by_two_methods_does_not_part_within_their_errors() -> None:
@@ -86,11 +86,11 @@ def test_one_motion_by_two_methods_does_not_part_within_their_errors() -> None:
     a = coasting(loaded(1.0))
     b = coasting(loaded(1.0), method="RK4", step_s=0.05, record_every_s=0.05)
     found = rd.diff_runs(a, b)
-    assert b.error is not None and found.parted is None and 0 < found.joints[0].largest < 4 * b.error.largest
+    assert b.error is not None and found.parted_s is None and 0 < found.joints[0].largest < 4 * b.error.largest
     assert {each.name for each in found.settings} == {"method", "rtol", "atol", "step"}
     blind = rd.diff_runs(replace(a, error=None), b, tolerance=found.joints[0].largest / 2)
-    assert blind.parted is not None and any("no estimate" in each for each in blind.left_out)
-    assert rd.diff_runs(replace(a, error=None), b, tolerance=found.joints[0].largest * 2).parted is None
+    assert blind.parted_s is not None and any("no estimate" in each for each in blind.left_out)
+    assert rd.diff_runs(replace(a, error=None), b, tolerance=found.joints[0].largest * 2).parted_s is None
 
 
 def test_samples_at_other_times_are_interpolated_without_parting() -> None:
@@ -98,13 +98,13 @@ def test_samples_at_other_times_are_interpolated_without_parting() -> None:
     a, b = coasting(loaded(1.0)), coasting(loaded(1.0), record_every_s=0.013)
     found = rd.diff_runs(a, b)
     assert a.error is not None and b.error is not None
-    assert found.common < found.samples and found.fraction > 0.9 and found.parted is None
+    assert found.common < found.samples and found.fraction > 0.9 and found.parted_s is None
     assert 0 < found.interpolation <= a.error.largest + b.error.largest
     assert found.joints[0].largest <= 2 * (a.error.largest + b.error.largest) + found.interpolation
     parts = rd.diff_runs(a, coasting(loaded(1.001), record_every_s=0.013))
     t = np.linspace(0, DURATION, 5001)
     gap = abs(motion(loaded(1.0), t)[0] - motion(loaded(1.001), t)[0]).max()
-    assert parts.parted is not None and parts.joints[0].largest == pytest.approx(gap, rel=1e-4)
+    assert parts.parted_s is not None and parts.joints[0].largest == pytest.approx(gap, rel=1e-4)
 
 
 BOUNCING = rd.Plant(rd.load("planar_2r"), [rd.effects.RigidStops(-1.0, 1.0, 0.6)])
@@ -118,7 +118,7 @@ def bouncing(period: float, **given: Any) -> rd.Trajectory:
 def test_one_motion_across_impacts_does_not_part(first: float, second: float) -> None:
     """Polynomials across an impact err by 0.02 rad; at common samples both are the same to 1e-15."""
     found = rd.diff_runs(bouncing(first), bouncing(second))
-    assert found.parted is None and found.common > 1
+    assert found.parted_s is None and found.common > 1
     errors = [run.error.largest for run in found.runs if run.error is not None]
     assert all(each.largest <= 2 * sum(errors) + found.interpolation for each in found.joints if each.quantity == "q")
     assert all(each.largest < 1e-9 for each in found.joints)  # v and u are those of common samples
@@ -127,7 +127,7 @@ def test_one_motion_across_impacts_does_not_part(first: float, second: float) ->
 def test_runs_with_few_times_in_common_are_not_said_to_be_the_same_motion() -> None:
     """Every 0.05 and 0.03 s, with an impact in most intervals: 8 common samples, between which both have others."""
     found = rd.diff_runs(bouncing(0.05), bouncing(0.03))
-    assert found.parted is None and not found.is_conclusive and found.fraction < 0.5
+    assert found.parted_s is None and not found.is_conclusive and found.fraction < 0.5
     assert "record both at the same times" in found.sentence and "do not part" not in found.sentence
     page = rd.replay(bouncing(0.05), bouncing(0.03)).document
     (title,) = [each["title"] for each in page["plots"] if each["title"].startswith("difference of q")]
@@ -145,8 +145,8 @@ def test_runs_without_any_time_to_compare_have_no_numbers() -> None:
     found = rd.diff_runs(run, replace(run, t=run.t + 0.02))
     assert found.fraction < 0.5 and not found.is_conclusive
     none = rd.diff_runs(replace(run, a=np.full_like(run.a, np.nan)), replace(run, t=run.t + 0.02, a=run.a * np.nan))
-    assert none.samples == 0 and none.parted is None and np.isnan(none.joints[0].largest) and none.fraction == 0
-    assert (none.start, none.end) == (0.02, 1.0)
+    assert none.samples == 0 and none.parted_s is None and np.isnan(none.joints[0].largest) and none.fraction == 0
+    assert (none.start_s, none.end_s) == (0.02, 1.0)
     assert rd.replay(run, replace(run, t=run.t + 0.02, a=run.a * np.nan)).document["plots"]
 
 
@@ -173,7 +173,7 @@ def test_an_event_that_no_run_names_does_not_part_one_motion(order: int) -> None
         size = 10 ** rng.uniform(-8, 1)
         made = [recorded(h, kink, size) for h in periods]
         found = rd.diff_runs(*made, tolerance=10 ** rng.uniform(-8, -2))
-        assert found.parted is None, (periods, kink, size)
+        assert found.parted_s is None, (periods, kink, size)
         interpolated += found.common < found.samples
     assert interpolated > 40
 
@@ -189,7 +189,7 @@ def test_pairs_of_one_motion_do_not_part_and_pairs_that_differ_by_ten_times_thei
 def test_the_common_part_of_runs_of_different_length_is_compared_and_said() -> None:
     a, b = coasting(loaded(1.0)), coasting(loaded(1.0), duration_s=0.8)
     found = rd.diff_runs(a, b)
-    assert found.end == DURATION and found.parted is None
+    assert found.end_s == DURATION and found.parted_s is None
     assert found.left_out == ("0.5 to 0.8 s, covered by run 2 only",)
 
 
@@ -228,7 +228,7 @@ def test_runs_that_have_nothing_in_common_are_refused() -> None:
     for a, b in ((run, other), (other, run)):
         with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; give two of one robot"):
             rd.diff_runs(a, b)
-    named = replace(run, about=run.about | {"robot": "another"})
+    named = replace(run, metadata=run.metadata | {"robot": "another"})
     with pytest.raises(QueryError, match="different robots, pendulum and another"):
         rd.diff_runs(run, named)
     with pytest.raises(QueryError, match=r"no time in common: 0 to 0\.5 s and 1 to 1\.5 s"):
@@ -243,7 +243,7 @@ def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Pat
     light, heavy = (rd.read(tmp_path / f"{name}.npz") for name in ("light", "heavy"))
     found = rd.diff_runs(light, heavy)
     assert found.names == ("light", "heavy") and [each.name for each in found.settings] == ["payload on rod"]
-    old = replace(light, about={name: text for name, text in light.about.items() if name != "settings"})
+    old = replace(light, metadata={name: text for name, text in light.metadata.items() if name != "settings"})
     assert "edits" in {each.name for each in rd.diff_runs(old, heavy).settings}
     assert any("contains no settings" in each for each in rd.diff_runs(old, heavy).left_out)
 
@@ -259,7 +259,7 @@ def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:
     assert found["settings"][0].keys() == names(keys["settings"].partition(": ")[2])
     assert ran("diff-runs", *paths, "-o", tmp_path / "d.svg", "--csv", tmp_path / "d.csv").returncode == 0
     assert (tmp_path / "d.svg").read_bytes().startswith(b"<?xml")
-    assert (tmp_path / "d.csv").read_text(encoding="utf-8").startswith("joint,quantity,unit,rms,largest,at\n")
+    assert (tmp_path / "d.csv").read_text(encoding="utf-8").startswith("joint,quantity,unit,rms,largest,at_s\n")
 
 
 def test_runs_are_named_by_both_settings_in_which_they_differ() -> None:

@@ -122,7 +122,7 @@ def _compared(scene: Scene, a: rd.Trajectory, b: rd.Trajectory, both: tuple[floa
     assert difference is not None
     off = float((np.abs(difference.q).max(axis=1) / difference.bound).max(initial=0.0))
     label = f"{scene.label} {a.statistics.method} every {both[0]:.3g} and {both[1]:.3g} s"
-    return Pair(label, scene.family, found.parted is not None, found.is_conclusive, found.fraction, apart, off)
+    return Pair(label, scene.family, found.parted_s is not None, found.is_conclusive, found.fraction, apart, off)
 
 
 def _one_motion(task: tuple[int, int]) -> Pair | None:

@@ -70,7 +70,7 @@ def test_the_summary_of_a_run_file_has_the_lines_of_a_summary(swing: rd.Trajecto
     remark = Remark(RemarkKind.CHATTER, HOSTILE, "u", 0.0, 0.1, 0.0, 1.0, None, {"unit": HOSTILE})
     strange = replace(
         swing, outcome=Outcome(Reason.TERMINAL_EVENT, 0.01, HOSTILE, {"event": HOSTILE}),
-        about=swing.about | {"right_angles": HOSTILE},
+        metadata=swing.metadata | {"right_angles": HOSTILE},
         acting=(HOSTILE,), remarks=(remark,), statistics=replace(swing.statistics, method=HOSTILE, engine=HOSTILE),
     )  # fmt: skip
     loaded = rd.read(strange.save(tmp_path / "run.npz"))

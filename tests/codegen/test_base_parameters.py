@@ -168,16 +168,16 @@ def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
     options = {"q0": q, "duration_s": 0.01, "method": "RK4", "estimate_error": False}
     run = rd.simulate(given, **options, engine="compiled")
     assert f"\nright angles, in machine code: {words}\n" in run.summary
-    assert rd.read(run.save(tmp_path / "run")).about["right_angles"] == words
+    assert rd.read(run.save(tmp_path / "run")).metadata["right_angles"] == words
     runs = rd.rollouts(given, q, duration_s=0.01, method="RK4")
-    assert runs.about["right_angles"] == words and words in runs[0].summary
+    assert runs.metadata["right_angles"] == words and words in runs[0].summary
     interpreted = rd.simulate(given, **options, engine="interpreted")
     exact = rd.simulate(completed(given)[0], **options, engine="compiled")
     for other in (interpreted, exact):
-        assert "right_angles" not in other.about and "right angles" not in other.summary
+        assert "right_angles" not in other.metadata and "right angles" not in other.summary
     law = rd.control.PDGravity(given, rd.control.hold([0.3]), kp=5.0, kd=1.0)
     run = rd.simulate(completed(given)[0], **options, engine="compiled", controller=law)
-    assert run.about["right_angles"] == words
+    assert run.metadata["right_angles"] == words
 
 
 def test_explain_names_right_angles(tmp_path) -> None:

@@ -321,7 +321,7 @@ def test_extremes_are_those_at_the_roots_of_the_derivative(pieces: int, order: i
             at = np.array([0.0, h, *real[(real > 0) & (real < h)]])
             values, times = [*values, *polynomial.polyval(at, p)], [*times, *(start + at)]
         low, high = int(np.argmin(values)), int(np.argmax(values))
-        given = found.least[joint], found.greatest[joint], found.at_least[joint], found.at_greatest[joint]
+        given = found.least[joint], found.greatest[joint], found.least_at_s[joint], found.greatest_at_s[joint]
         np.testing.assert_allclose(given, [values[low], values[high], times[low], times[high]], rtol=1e-7, atol=1e-9)
 
 

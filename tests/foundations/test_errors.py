@@ -23,7 +23,7 @@ from robot_dyn.simulation import Outcome, Reason
 from tests.wrong_arguments import Example
 
 OPTIONAL = ("peers", "live", "video")  # need packages that may be absent
-OF_TYPE = {"bool": True, "str": "joint_1", "float": 0.25, "int": 3, "Any": 0.25, "tuple": ("effect", 0)}
+OF_TYPE = {"bool": True, "str": "joint_1", "float": 0.25, "int": 3, "Any": 0.25, "Scalar": 0.25, "tuple": ("effect", 0)}
 OF_TYPE["Outcome"] = Outcome(Reason.STATE_OVERFLOWS, 0.25, "joint_1", {"largest": 1e200})
 MASSLESS = (
     '<robot name="a"><link name="b"/><link name="l"/><joint name="j" type="continuous"><parent link="b"/>'

@@ -131,7 +131,7 @@ def test_a_run_without_what_its_effects_exerted_says_so() -> None:
     with pytest.raises(QueryError, match=r"contains no torques of its effects.*simulate it again"):
         replace(run, effect_torques=None).causes()
     with pytest.raises(QueryError, match="contains no URDF"):
-        replace(run, about={}).causes()
+        replace(run, metadata={}).causes()
     with pytest.raises(QueryError, match="no accelerations"):
         replace(run, a=run.a * np.nan).causes()
 

@@ -441,6 +441,6 @@ def test_metadata_of_packages_are_read_once(monkeypatch) -> None:
     asked = []
     monkeypatch.setattr(origin, "version_of", lambda name: asked.append(name) or "1")
     for _ in range(3):
-        assert "robot-dyn 1" in rd.simulate(rd.Plant(RAIL), q0=[0.0], duration_s=0.01).about["versions"]
+        assert "robot-dyn 1" in rd.simulate(rd.Plant(RAIL), q0=[0.0], duration_s=0.01).metadata["versions"]
     assert len(asked) == len(set(asked)) > 0
     origin.versions.cache_clear()

@@ -191,7 +191,7 @@ def test_an_event_that_cannot_be_compiled_is_named_and_runs_interpreted() -> Non
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: rd.Event(3), "give one of"),
+        (lambda: rd.Event(3), "give a function of"),
         (lambda: rd.Event(lambda t: t), "give a function of"),
         (lambda: rd.Event(lambda t, q, v: t, direction=2), "direction must be"),
         (lambda: rd.simulate(ARM, [0.0, 0.0], events=3), "give a list of rd.Event"),

@@ -83,7 +83,7 @@ def test_parquet_is_the_table_with_units(of: str, request, tmp_path: Path) -> No
         quantity, of_what, unit = (field.metadata[key].decode() for key in (b"quantity", b"of", b"unit"))
         assert field.name == " ".join(filter(None, (quantity, of_what, unit and f"[{unit}]")))
     about = {key.decode(): text.decode() for key, text in back.schema.metadata.items()}
-    assert about["robot"] == "cart_pole" and about.get("settings") == of.about.get("settings")
+    assert about["robot"] == "cart_pole" and about.get("settings") == of.metadata.get("settings")
     assert about["summary"].splitlines()[0] == of.summary.splitlines()[0]
 
 

@@ -74,4 +74,4 @@ def test_a_run_gives_its_robot_back_with_all_its_edits() -> None:
 def test_edits_that_are_none_are_refused(edits: str) -> None:
     run = rd.simulate(rd.load("pendulum"), q0=[0.1], duration_s=0.002, estimate_error=False)
     with pytest.raises(rd.RobotDynError, match=r"edits|gravity must"):
-        robot_of(replace(run, about=run.about | {"edits": edits}))
+        robot_of(replace(run, metadata=run.metadata | {"edits": edits}))

@@ -19,7 +19,7 @@ PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
 Q, V = np.array([0.3, -0.4]), np.array([0.2, 0.5])
 OPTIONS: dict[str, Any] = {
     "duration_s": 0.05, "controller": rd.control.PD(rd.control.hold([0.1, 0.2]), kp=[20.0, 9.0], kd=2.0),
-    "method": "RK4", "step_s": 2e-3, "record_every_s": 0.01, "about": {"author": "me"},
+    "method": "RK4", "step_s": 2e-3, "record_every_s": 0.01, "metadata": {"author": "me"},
 }  # fmt: skip
 
 
@@ -32,7 +32,7 @@ def test_the_signature_shows_every_attribute_of_a_setup_with_its_default(functio
         assert (shown[name].kind, shown[name].default) == (Parameter.KEYWORD_ONLY, None)
     for name in Options.__annotations__.keys() - tolerances:
         assert shown[name].kind is Parameter.KEYWORD_ONLY
-        built = {} if name == "about" else stated[name].default  # of the factory, which says nothing
+        built = {} if name == "metadata" else stated[name].default  # of the factory, which says nothing
         assert shown[name].default == built, name
     assert list(shown)[:3] == ["what", "q0", "v0"]
     assert not any(each.kind is Parameter.VAR_KEYWORD for each in shown.values())
@@ -52,7 +52,7 @@ def test_a_robot_a_plant_and_a_setup_give_the_same_run() -> None:
         for run in same[1:]:
             np.testing.assert_array_equal(run.q, same[0].q)
             np.testing.assert_array_equal(run.u, same[0].u)
-            assert run.about["author"] == "me"
+            assert run.metadata["author"] == "me"
 
 
 @pytest.mark.parametrize("method", ["auto", "DOP853", rd.integrate.Adaptive("Rodas5P", atol=1e-3)], ids=str)

@@ -299,7 +299,7 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
     if grows:
         (said,) = (each for each in run.remarks if each.kind is RemarkKind.UNSTABLE)
         assert said.value == pytest.approx(radius(period), rel=1e-6)
-        assert "control loop unstable, deviations grow: pivot by 1." in run.summary
+        assert "control loop unstable, deviations grow: pivot by a factor of 1." in run.summary
         assert float(said.remedy.split("use period_s=")[1].split(",")[0]) < low
 
 

@@ -50,7 +50,7 @@ def starts(count: int, spread: float = 0.3) -> np.ndarray:
 
 def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
     """All arrays of numbers of a batch, by run."""
-    given = [runs.q, runs.v, runs.u, runs.kinetic, runs.potential, *(runs.work or {}).values(), runs.ended]
+    given = [runs.q, runs.v, runs.u, runs.kinetic, runs.potential, *(runs.work or {}).values(), runs.ended_s]
     return [x for x in given if x is not None]
 
 
@@ -188,16 +188,16 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects:
     for i in wild:
         alone, outcome = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False), runs.outcome(i)
         assert alone.outcome.ending == outcome.ending == "diverged" and runs[i].outcome == outcome
-        assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=0.01)
-        later = runs.t > runs.ended[i] + 1e-9
+        assert runs.ended_s[i] == pytest.approx(alone.outcome.t, abs=0.01)
+        later = runs.t > runs.ended_s[i] + 1e-9
         assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.u[i, later]).all()
         assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs[i].q).all()
-        assert runs.ended[i] < 0.2 and "step" in outcome.text
+        assert runs.ended_s[i] < 0.2 and "step" in outcome.text
         assert (outcome.reason, outcome.joint) == (alone.outcome.reason, alone.outcome.joint)
         if len(effects) == 2:  # nothing cuts their steps
             assert runs.ends[i].joint == ARM.joint_names[np.argmax(np.abs(runs[i].v[-1]))]
             assert runs.ends[i].facts == {"step_s": pytest.approx(0.002)}
-    assert "2 diverged" in runs.summary and f"run 3 diverged at t = {runs.ended[3]:g} s; " in runs.summary
+    assert "2 diverged" in runs.summary and f"run 3 diverged at t = {runs.ended_s[3]:g} s; " in runs.summary
     assert not runs.outcome(0).text
 
 
@@ -209,7 +209,7 @@ def test_a_run_that_overflows_ends_at_the_step_at_which_simulate_ends_it(engine:
     setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, method="Euler", step_s=h, engine=engine)
     runs = rd.rollouts(replace(setup, engine="auto"), q0, v0)
     wild = np.flatnonzero(runs.diverged)
-    assert len(set(np.rint(runs.ended[wild] / h))) > 2
+    assert len(set(np.rint(runs.ended_s[wild] / h))) > 2
     for i in wild:
         alone = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False)
         assert (alone.outcome.ending, alone.outcome.t) == (runs.outcome(i).ending, runs.outcome(i).t)
@@ -254,7 +254,7 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
     assert run.error is None and "not estimated (a run of rollouts)" in run.summary
     assert_alike(run.extremes, alone.extremes)
     assert ("was not recorded" in run.summary) is not everything
-    assert {name: run.about[name] for name in alone.about} == alone.about
+    assert {name: run.metadata[name] for name in alone.metadata} == alone.metadata
 
 
 def test_runs_are_numbered_as_lists_are() -> None:
@@ -286,7 +286,7 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [("replay", "--html", "page.html"), ("diff", "run.npz")], ids=lambda command: command[0]
+    "command", [("replay", "--html", "page.html"), ("diff-runs", "run.npz")], ids=lambda command: command[0]
 )
 def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
     """A batch is not reported as damaged; the advised remedy makes a file that they accept."""
@@ -316,7 +316,7 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
     for x, y in zip(arrays(runs), arrays(back), strict=True):
         np.testing.assert_array_equal(x, y)
     assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
-    assert back.about["urdf"] == runs.about["urdf"] and back.varied["kp"][3, 0] == 3.0
+    assert back.metadata["urdf"] == runs.metadata["urdf"] and back.varied["kp"][3, 0] == 3.0
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="cannot be read as a run file"):
         rd.read(path)
@@ -441,8 +441,8 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
             assert runs.outcome(i).ending == alone.outcome.ending == "finished" and back.outcome(i) == runs.outcome(i)
             assert runs.outcome(i).text == alone.outcome.text
-            assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=1e-12)
-            before = runs.t < runs.ended[i] if runs.ended[i] < 0.3 else runs.t <= 0.3
+            assert runs.ended_s[i] == pytest.approx(alone.outcome.t, abs=1e-12)
+            before = runs.t < runs.ended_s[i] if runs.ended_s[i] < 0.3 else runs.t <= 0.3
             np.testing.assert_allclose(runs.q[i, before], alone.q[: before.sum()], rtol=0, atol=1e-11)
             assert np.isnan(runs.q[i, ~before]).all()
         assert "'down'" in runs.outcome(0).text and not runs.outcome(2).text
@@ -469,8 +469,8 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
     runs = rd.rollouts(setup, starts(200), threads=2)
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])
-    assert runs.outcome(i).ending == "stopped" and runs.ended[i] < 100.0
-    assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended[i]]).all()
+    assert runs.outcome(i).ending == "stopped" and runs.ended_s[i] < 100.0
+    assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended_s[i]]).all()
     assert len(effects) == 3 or runs.t[-1] < 100.0
     assert f"{runs.stopped.sum()} stopped by an interrupt, the first at t = " in runs.summary
 
@@ -481,7 +481,7 @@ def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
     rd.rollouts(setup, starts(1))  # compiled before
     interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)
-    idle = np.flatnonzero(runs.stopped & (runs.ended == 0.0))
+    idle = np.flatnonzero(runs.stopped & (runs.ended_s == 0.0))
     assert len(idle)
     run = runs[int(idle[-1])]
     np.testing.assert_array_equal(run.q, starts(200)[idle[-1:]])

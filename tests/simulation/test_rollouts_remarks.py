@@ -185,7 +185,7 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     for i, row in enumerate(rows):
         assert float(row["start q slide [m]"]) == runs.q0[i, 0]
         assert float(row["start v hinge [rad/s]"]) == runs.v0[i, 1]
-        assert row["outcome"] == runs.outcome(i).ending and float(row["ended [s]"]) == runs.ended[i]
+        assert row["outcome"] == runs.outcome(i).ending and float(row["ended [s]"]) == runs.ended_s[i]
         about = {f"{kind} {quantity} {joint}" for kind, joint, quantity in told(runs[i])}
         assert about <= set(row["remarks"].split("; "))
     with pytest.raises(rd.RobotDynError, match=r"table\.csv"):
@@ -219,7 +219,7 @@ def test_tracking_errors_of_a_frame() -> None:
     assert runs.worst == 2
     alone = [rd.simulate(runs.setup_of(i), estimate_error=False).rms_tracking_error for i in range(3)]
     np.testing.assert_allclose(runs.rms_tracking_error[:2], alone[:2], rtol=1e-9)
-    assert {run.about["frame"] for run in runs} == {"tip"} and "tracking error of the frame [m]: " in runs.summary
+    assert {run.metadata["frame"] for run in runs} == {"tip"} and "tracking error of the frame [m]: " in runs.summary
 
 
 def test_a_batch_of_one_speaks_of_a_run() -> None:

@@ -50,12 +50,12 @@ def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
     """
     back = rd.read(run.save(tmp_path / "run"))
     again = rd.read(back.save(tmp_path / "again"))
-    assert (back.about["file"], again.about["file"]) == ("run.npz", "again.npz")
-    texts = {name: text for name, text in back.about.items() if name != "file"}
-    assert_same(replace(back, about=texts | {"source": run.about["source"]}), run)
+    assert (back.metadata["file"], again.metadata["file"]) == ("run.npz", "again.npz")
+    texts = {name: text for name, text in back.metadata.items() if name != "file"}
+    assert_same(replace(back, metadata=texts | {"source": run.metadata["source"]}), run)
     assert back.summary == run.summary
     contents = {"urdf": "<robot", "scene": 'kind = "spring"', "versions": "pin 4", "edits": "gravity"}
-    assert all(content in back.about[name] for name, content in contents.items())
+    assert all(content in back.metadata[name] for name, content in contents.items())
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.3, 0.99, "hello", None])
@@ -129,12 +129,12 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "no text 'about'"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not JSON"),
         ("about", lambda text: np.array([str(text)]), "no text 'about'"),
-        ("about", lambda text: said(text, format=3), "it has format 3, but this version reads 9; .*robot-dyn"),
+        ("about", lambda text: said(text, format=3), "it has format 3, but this version reads 10; .*robot-dyn"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("about", lambda text: said(text, novelty=3), "'novelty': .*3"),
-        ("about", lambda text: said(text, about__urdf=3), "'about/urdf': .*3"),
-        ("about", lambda text: said(text, about__urdf="\ud800"), "'about': "),
+        ("about", lambda text: said(text, metadata__urdf=3), "'metadata/urdf': .*3"),
+        ("about", lambda text: said(text, metadata__urdf="\ud800"), "'about': "),
         ("about", lambda text: said(text, joint_names="ab"), "'joint_names': .*'ab'"),
         ("about", lambda text: said(text, joint_names=[1, 2]), "'joint_names/0': .*1"),
         ("about", lambda text: said(text, joint_names=["a"]), "'q' is of 2 joints, 'joint_names' of 1"),

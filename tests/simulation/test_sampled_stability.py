@@ -10,6 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.simulation import RemarkKind
+from robot_dyn.simulation.dynamics.stability import Stability
 from tests.campaigns.estimates.scenes import RAIL
 from tests.long import long
 from tests.short_loops import Arm, ShortLoop, judge
@@ -82,7 +83,8 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
         controller=rd.control.PD(rd.control.hold(q), kp=np.array(kp), kd=np.array(kd), period_s=1e-3),
     )
     assert advice.stable
-    assert "control period 0.001 s: marginal, some deviations neither decay nor grow; the loop is up to" in advice.text
+    assert advice.at_period is Stability.MARGINAL
+    assert f"none grows up to a period of {advice.longest_period_s:.3g} s" in advice.text
     assert radius(advice.longest_period_s) <= 1 < radius(1.001 * advice.longest_period_s)
 
 
@@ -98,7 +100,7 @@ def test_a_loop_that_is_unstable_at_every_period_says_why(law: rd.control.Contro
     advice = rd.advise(BLOCK, [0.1], duration_s=0.02, controller=law)
     assert advice.longest_period_s == 0.0
     assert not advice.stable
-    assert f"unstable, as every period is: take {remedy}" in advice.text
+    assert f"unstable; no period is stable: use {remedy}" in advice.text
     assert (advice.grows_anyway > 0) == (remedy == "other gains")
 
 

@@ -185,10 +185,10 @@ def test_a_frame_that_follows_a_circle_has_a_tracking_error_in_metres() -> None:
 
 
 def test_a_run_from_python_carries_its_origin() -> None:
-    about = rd.simulate(DOUBLE, q0=[0.1, 0.2], duration_s=0.01).about
-    assert "<robot" in about["urdf"]
-    assert "gravity" in about["edits"]
-    assert "pin" in about["versions"]
+    metadata = rd.simulate(DOUBLE, q0=[0.1, 0.2], duration_s=0.01).metadata
+    assert "<robot" in metadata["urdf"]
+    assert "gravity" in metadata["edits"]
+    assert "pin" in metadata["versions"]
 
 
 def test_the_summary_says_what_acted_and_nothing_else() -> None:

@@ -57,7 +57,7 @@ def setups() -> dict[str, rd.Setup]:
         "free swing": rd.Setup(rd.Plant(ARM), Q, V, method="DOP853", **compiled),
         "computed torque": rd.Setup(
             plant, Q, V, controller=rd.control.ComputedTorque(ARM, PLAN, kp=90.0, kd=15.0),
-            **compiled, about={"author": "me"},
+            **compiled, metadata={"author": "me"},
         ),
         "sampled, RK4": rd.Setup(plant, Q, V, controller=sampled, method="RK4", **compiled),
         "steps too long": rd.Setup(
@@ -309,10 +309,10 @@ def test_nothing_waits_of_a_run_that_did_not_finish() -> None:
 
 
 def test_a_text_that_is_added_to_a_setup_later_is_none_of_the_run() -> None:
-    setup = replace(setups()["free swing"], about={"author": "me"}, estimate_error=False)
+    setup = replace(setups()["free swing"], metadata={"author": "me"}, estimate_error=False)
     run = rd.simulate(setup)
-    setup.about["author"] = "you"
-    assert run.about["author"] == "me"
+    setup.metadata["author"] = "you"
+    assert run.metadata["author"] == "me"
 
 
 @pytest.mark.parametrize("name", ["computed torque", "sampled, RK4"])
@@ -380,13 +380,13 @@ def test_a_call_with_equal_arguments_builds_no_setup(what: Any, monkeypatch: pyt
     controller = rd.control.PD(PLAN, kp=60.0, kd=6.0)
 
     def call(q0: Any = (0.3, -0.4), **more: Any) -> None:
-        more = {"duration_s": 0.02, "controller": controller, "engine": "interpreted", "about": {"a": "b"}} | more
+        more = {"duration_s": 0.02, "controller": controller, "engine": "interpreted", "metadata": {"a": "b"}} | more
         rd.simulate(what, list(q0), np.array(V), **more)
 
     call()
     assert built_by(call, monkeypatch) == 0
     others: list[dict[str, Any]] = [
-        {"q0": (0.3, -0.3)}, {"duration_s": 0.03}, {"about": {"a": "c"}}, {"q0": (-0.0, 0.0)}, {"q0": (0.0, 0.0)},
+        {"q0": (0.3, -0.3)}, {"duration_s": 0.03}, {"metadata": {"a": "c"}}, {"q0": (-0.0, 0.0)}, {"q0": (0.0, 0.0)},
         {"controller": replace(controller, kp=61.0)}, {"controller": None}, {"estimate_error": False},
     ]  # fmt: skip
     assert [built_by(lambda other=other: call(**other), monkeypatch) for other in others] == [1] * len(others)
@@ -430,10 +430,10 @@ def test_a_start_of_any_kind_that_is_changed_in_place_is_another_start(kind: Any
 
 
 def test_texts_that_are_changed_in_place_are_other_texts() -> None:
-    plant, about = rd.Plant(ARM), OrderedDict(a="1")
+    plant, metadata = rd.Plant(ARM), OrderedDict(a="1")
     for text in ("1", "2", "1"):
-        about["a"] = text
-        assert rd.simulate(plant, Q, duration_s=0.02, about=about).about["a"] == text
+        metadata["a"] = text
+        assert rd.simulate(plant, Q, duration_s=0.02, metadata=metadata).metadata["a"] == text
 
 
 def test_setups_of_parts_that_may_change_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,4 +60,4 @@ def stretched(run, m: int, **changes):
 
 
 def many(run, n: int, m: int = 50):
-    return stretched(replace(run, joint_names=tuple(f"joint_{i:02d}" for i in range(n)), about={}), m)
+    return stretched(replace(run, joint_names=tuple(f"joint_{i:02d}" for i in range(n)), metadata={}), m)

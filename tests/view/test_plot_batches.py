@@ -139,7 +139,7 @@ def test_all_parts_fit_a_page_and_are_named(some_lost, tmp_path) -> None:
         (["scatter"], {"x": "kq joint_1"}, "x: no column 'kq joint_1'; nearest: kp joint_1"),
         (["scatter"], {"y": "outcome"}, "y: no column 'outcome'"),  # which is text
         (["scatter"], {"x": 3}, "x must name a column of the table of runs, got 3"),
-        (["fan"], {"limits": [1.0, 1.0]}, "limits are of a run"),
+        (["fan"], {"limits": [1.0, 1.0]}, "limits= applies to a single run"),
     ],
 )
 def test_names_that_are_not_there_are_refused(runs, names: list[str], options: dict, text: str) -> None:

@@ -72,7 +72,7 @@ def test_tracking_plots_the_tracking_error_with_its_rms(run, cart) -> None:
         ({"joints": ["elbow"]}, "no joint 'elbow'; nearest: elbow_joint"),
         ({"theme": "blue"}, "no theme"),
         ({"style": "papr"}, "no style 'papr'; nearest: paper"),
-        ({"style": "paper", "theme": "dark"}, "leave theme='dark' out"),
+        ({"style": "paper", "theme": "dark"}, "omit theme='dark'"),
         ({"limits": np.ones(2)}, r"limits must have shape \(6,\) or .*, got \(2,\)"),
         ({"width_mm": 10}, "width_mm must be at least 80, got 10"),
         ({"width_mm": 2e3}, "width_mm must be at most 1000, got 2000"),
@@ -93,7 +93,7 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
         assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
         assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
     assert all(box.height / figure.dpi * MM >= 8.4 for box in boxes)
-    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; name those to show"):
+    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; select some"):
         plot(many(run, MOST_JOINTS + 1), "joints")
 
 
@@ -135,7 +135,7 @@ def test_units_are_those_of_each_joint(run, cart) -> None:
     assert [axes.get_ylabel() for axes in cells(figure, "q")] == ["q [m]", "q [rad]"]
     assert [axes.get_ylabel() for axes in cells(figure, "u")] == ["u [N]", "u [N m]"]
     assert {axes.get_xlabel() for axes in cells(figure, "v")} >= {"t [s]", "q [m]", "q [rad]"}
-    assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, about={})).axes}
+    assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, metadata={})).axes}
 
 
 def test_every_axis_has_a_unit(run) -> None:
@@ -240,7 +240,7 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     """No mathematics, no hidden labels, no letters that the font lacks; a long name keeps both its ends."""
     names = (r"$\frac", "_first", "a_b^{c$x$", "関節", "arm_" + "x" * 200 + "_end", "per%cent #1")
     sources = {r"_$\sum$": run.ledger.kinetic, "control": run.ledger.kinetic}
-    hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), about={})
+    hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), metadata={})
     plot(hostile).save(tmp_path / "names.png", dpi=40)  # warnings are errors
     titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
     assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]

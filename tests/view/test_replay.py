@@ -267,9 +267,9 @@ def test_runs_that_cannot_be_shown_say_why(swing) -> None:
     arrays = {name: getattr(swing, name)[:0] for name in ("t", "q", "v", "a", "u")}
     for why, changes in (
         ("no samples", arrays),
-        ("contains no URDF", {"about": {}}),
+        ("contains no URDF", {"metadata": {}}),
         ("not those of its URDF", {"joint_names": ("a", "b")}),
-        ("edits in the run cannot be read", {"about": swing.about | {"edits": json.dumps({"gravity": 1})}}),
+        ("edits in the run cannot be read", {"metadata": swing.metadata | {"edits": json.dumps({"gravity": 1})}}),
     ):
         with pytest.raises(rd.RobotDynError, match=why):
             rd.replay(replace(swing, **changes))

@@ -122,7 +122,7 @@ def compare(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Compare Pinocchio with the library's own Lagrangian.
+    """Compare Pinocchio with the library's independent Lagrangian.
 
     The exit code is 1 if they disagree.
 

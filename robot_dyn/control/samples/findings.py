@@ -58,13 +58,13 @@ def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterato
         outside = list(_outside(table, i, q[k], table.t[k], "outside its limits", "check unit and joint"))
         yield from jumps + outside
         if not jumps and velocity.largest[i] > (1 + _ROUNDING) * limit:
-            at = velocity.at_greatest[i] if velocity.greatest[i] > -velocity.least[i] else velocity.at_least[i]
+            at = velocity.greatest_at_s[i] if velocity.greatest[i] > -velocity.least[i] else velocity.least_at_s[i]
             yield (
                 f"{name} moves at {velocity.largest[i]:.4g} {unit}/s at {at:.6g} s, although its samples are within the"
                 f" limit of {limit:.4g}; lengthen the times, or give more samples"
             )
         if not jumps and not outside:
-            for q, t in ((position.least, position.at_least), (position.greatest, position.at_greatest)):
+            for q, t in ((position.least, position.least_at_s), (position.greatest, position.greatest_at_s)):
                 where = "between samples within its limits"
                 yield from _outside(table, i, q[i], t[i], where, "give more samples there")
     yield from _noise(turns)

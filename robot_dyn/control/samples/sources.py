@@ -26,9 +26,13 @@ class DataFrame(Protocol):
     """A table of pandas or polars."""
 
     @property
-    def columns(self) -> Iterable[object]: ...
+    def columns(self) -> Iterable[object]:
+        """Names of its columns."""
+        ...
 
-    def to_numpy(self) -> np.ndarray: ...
+    def to_numpy(self) -> np.ndarray:
+        """Return its values, one row for each row of the table."""
+        ...
 
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@ class Difference:
 
     Attributes:
         joint_names: Names of the n joints.
-        start, end: First and last time of both runs, in [s].
+        start_s, end_s: First and last time of both runs, in [s].
         t: The times at which they are compared, (k,), in [s].
         q, v, u: b − a, (k, n); nan if not recorded; v and u are nan between common samples.
         is_common: True at times when both runs have a sample, (k,); at the others, q of one run is interpolated.
@@ -52,8 +52,8 @@ class Difference:
     """
 
     joint_names: tuple[str, ...]
-    start: float
-    end: float
+    start_s: float
+    end_s: float
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
@@ -65,7 +65,7 @@ class Difference:
     estimated: bool
 
     @property
-    def parted(self) -> float | None:
+    def parted_s(self) -> float | None:
         """The first time at which q differs by more than the bound, in [s]; None if it never does."""
         beyond = np.flatnonzero(~(np.abs(self.q).max(axis=1) <= self.bound))
         return float(self.t[beyond[0]]) if len(beyond) else None
@@ -76,15 +76,15 @@ class Difference:
         return self.fraction >= HALF
 
     @property
-    def judged_until(self) -> float:
+    def judged_until_s(self) -> float:
         """The last time before the first unknown bound, in [s]."""
         bounded = np.cumsum(np.isinf(self.bound)) == 0
-        return float(self.t[bounded][-1]) if bounded.any() else self.start
+        return float(self.t[bounded][-1]) if bounded.any() else self.start_s
 
 
 def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
     """Raise a QueryError unless two runs are of one robot and have times in common."""
-    names = tuple(run.about.get("robot", "") for run in (a, b))
+    names = tuple(run.metadata.get("robot", "") for run in (a, b))
     if a.joint_names != b.joint_names:
         both = [f"{name or 'a robot'} ({', '.join(x.joint_names)})" for name, x in zip(names, (a, b), strict=True)]
         raise QueryError(f"runs of different joints cannot be compared: {both[0]} and {both[1]}; give two of one robot")

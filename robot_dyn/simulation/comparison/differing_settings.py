@@ -51,15 +51,15 @@ def run_names(*runs: TrajectoryData) -> tuple[str, ...]:
     One or two settings name the runs. If more differ, one names them, and "…" stands for the others.
     """
     if len(runs) == 1:
-        return (runs[0].about.get("robot", "run"),)
+        return (runs[0].metadata.get("robot", "run"),)
     return next(names for names in _names(runs) if len(set(names)) == len(runs))
 
 
 def _names(runs: tuple[TrajectoryData, ...]) -> Iterator[tuple[str, ...]]:
     """Yield names of several runs, the best first; the last ones are distinct."""
-    yield tuple(run.about.get("robot", "run") for run in runs)
-    if all("file" in run.about for run in runs):
-        stems = ((Path(run.about["file"]).stem, run.about.get("run")) for run in runs)
+    yield tuple(run.metadata.get("robot", "run") for run in runs)
+    if all("file" in run.metadata for run in runs):
+        stems = ((Path(run.metadata["file"]).stem, run.metadata.get("run")) for run in runs)
         yield tuple(" run ".join(filter(None, parts)) for parts in stems)
     pairs = [{x.name: x for x in differing_settings(runs[0], run)} for run in runs[1:]]
     first = {name: setting.a for pair in pairs for name, setting in pair.items()}
@@ -95,7 +95,7 @@ def unknown_settings(a: TrajectoryData, b: TrajectoryData) -> tuple[str, ...]:
 def _settings(run: TrajectoryData) -> dict[str, str] | None:
     """Return the settings of a run; None if it has none that can be read."""
     try:
-        settings = json.loads(run.about["settings"])
+        settings = json.loads(run.metadata["settings"])
     except (KeyError, ValueError, RecursionError):
         return None
     is_text = isinstance(settings, dict) and all(isinstance(value, str) for value in settings.values())
@@ -106,16 +106,16 @@ def _of_old_run(run: TrajectoryData) -> dict[str, str]:
     """Return effects, edits and method."""
     acted = dict.fromkeys(run.acting or (), "acts")
     step = {"step": f"{run.statistics.step_s!r} s"} if run.statistics.step_s else {}
-    return acted | {"edits": run.about.get("edits", ""), "method": run.statistics.method} | step
+    return acted | {"edits": run.metadata.get("edits", ""), "method": run.statistics.method} | step
 
 
 def _texts(run: TrajectoryData) -> dict[str, str]:
     """Return start, accuracy, file of the robot and versions."""
     start = {f"start {key}": ", ".join(map(repr, getattr(run, key)[0].tolist())) for key in ("q", "v")}
-    urdf = run.about.get("urdf")
+    urdf = run.metadata.get("urdf")
     file = {} if urdf is None else {"file of the robot": f"SHA-256 {hashlib.sha256(urdf.encode()).hexdigest()[:12]}"}
     accuracy = {} if run.accuracy is None else {"accuracy": repr(float(run.accuracy.requested))}
-    texts = {label: run.about[key] for key, label in _TEXTS.items() if key in run.about}
+    texts = {label: run.metadata[key] for key, label in _TEXTS.items() if key in run.metadata}
     return (start if run.t[0] == 0 else {}) | accuracy | file | texts
 
 

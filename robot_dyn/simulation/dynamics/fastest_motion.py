@@ -20,7 +20,7 @@ from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
-_FASTEST = "the fastest motion {motion} with {rate_per_s:.3g} per second, of joint {moving_joint!r}, by "
+_FASTEST = "the fastest motion, of joint {moving_joint!r}, {motion} at {rate_per_s:.3g} per second because of "
 MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "no force acts back on the motion of {moving_joint!r}"
 """The sentence about the fastest motion, from `Fastest.facts`."""
 

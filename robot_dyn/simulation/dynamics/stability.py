@@ -209,7 +209,7 @@ def lengths(rates: Array, oscillations: Array, least: float = _LEAST) -> list[fl
 
 
 def first_unstable(is_unstable: Callable[[float], bool], candidates: list[float]) -> float:
-    """Return the length below the first unstable one; inf if none is unstable, 0 if the shortest is.
+    """Return the length below the first unstable one; inf if all are stable, 0 if the shortest is unstable.
 
     Args:
         is_unstable: Function of h that is True if Φ(h) is unstable.

@@ -1,7 +1,7 @@
 """The observer of a run: processes t, q, v, u of every step in memory that does not grow with the run.
 
-A time loop adds each step to `observation`, and writes a column for it into `columns`. When these are full, NumPy
-computes the extremes of windows of time from all of them at once.
+A time loop adds each step to `observation`, and writes a column for it into `columns`. When all columns are full, NumPy
+computes the extremes over windows of time from them at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _WINDOWS = 256  # largest number of windows: beyond it, windows are merged in pa
 
 @final
 class Observer:
-    """The observer of a run in progress.
+    """Observer of a run in progress.
 
     Args:
         start: The observation before the first step, which is continued.
@@ -90,7 +90,7 @@ class Observer:
         self.filled = 0
 
     def end(self) -> None:
-        """End the run: process the last columns or, if these are few, store them without the free ones."""
+        """End the run: process the last columns or, if these are few, only trim the array to them."""
         self.process(end=self.filled > _FEW)
         self.columns = self.columns[:, : self.filled].copy()
 

@@ -67,7 +67,11 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         "effort limit reached", ("{joint} " + _LASTED + " ({bound:.4g} {unit})", _SEEN)
     ),
     RemarkKind.STOP_REACHED: Sentence("joint stop reached", (_REACHED + ", " + _LASTED,)),
-    RemarkKind.BEYOND: Sentence("beyond the file's limits", (_REACHED, _SEEN), ("the plant does not enforce them",)),
+    RemarkKind.BEYOND: Sentence(
+        "exceeds limits of the file",
+        ("{joint} reached {value:.4g} {unit} at {at:.4g} s (limit {limit:.4g})", _SEEN),
+        ("the plant does not enforce them",),
+    ),
     RemarkKind.COARSE: Sentence(
         "record too coarse",
         ("{quantity} of {joint} {value:.4g} {unit} near {at:.4g} s (sampled: {limit:.4g})",),
@@ -102,8 +106,8 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         "control loop unstable, deviations grow",
         (
             (
-                "{joint} by {growth} in each period of {period_s:.4g} s about the state at {start:.4g} s, by "
-                "{over_run} over the run",
+                "{joint} by a factor of {growth} in each period of {period_s:.4g} s about the state at {start:.4g} s, "
+                "by {over_run} over the run",
                 "{joint} with {value:.3g} per second about the state at {start:.4g} s",
             ),
             ", {gains}",
@@ -132,9 +136,9 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         ),
     ),
     RemarkKind.JUMPS: Sentence(
-        "reference does not begin as the joint does",
+        "reference starts at another state than the joint",
         ("{quantity} of {joint} from {limit:.4g} to {value:.4g} {unit} at {at:.4g} s", _ELSEWHERE),
-        ("let it begin where and as fast as the joint does; rd.control.via_points(…) starts at rest",),
+        ("start the reference at the position and velocity of the joint; rd.control.via_points(…) starts at rest",),
     ),
     RemarkKind.HELD: Sentence(
         "held by friction at every step",

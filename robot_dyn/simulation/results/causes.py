@@ -77,6 +77,6 @@ def causes_of(run: TrajectoryData) -> Causes:
     if np.isnan(run.a).all() or np.isnan(run.u).all():
         raise QueryError("the run contains no accelerations or no actuation; simulate it with rd.simulate")
     robot = robot_of(run)
-    if "right_angles" in run.about:
+    if "right_angles" in run.metadata:
         robot, _ = right_angles.completed(robot)
     return by_cause(robot, run.t, run.q, run.v, run.a, run.u, run.effect_torques)

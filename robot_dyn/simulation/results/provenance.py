@@ -56,24 +56,24 @@ def settings_text(setup: Setup) -> dict[str, str]:
     return {"settings": json.dumps(settings_of(setup), ensure_ascii=False)}
 
 
-def packed(about: dict[str, str], folder: Path) -> dict[str, str]:
+def packed(metadata: dict[str, str], folder: Path) -> dict[str, str]:
     """Return the texts of a run for a file in `folder`: without the name of the file it was read from."""
-    about = {name: text for name, text in about.items() if name != "file"}
-    return about | {"source": portable(about["source"], folder)} if "source" in about else about
+    metadata = {name: text for name, text in metadata.items() if name != "file"}
+    return metadata | {"source": portable(metadata["source"], folder)} if "source" in metadata else metadata
 
 
-def unpacked(about: dict[str, str], file: Path) -> dict[str, str]:
+def unpacked(metadata: dict[str, str], file: Path) -> dict[str, str]:
     """Return the texts of a run that was read from a file, with the name of that file."""
-    about, folder = about | {"file": file.name}, file.parent
-    if "source" not in about:
-        return about
-    path = Path(about["source"])
+    metadata, folder = metadata | {"file": file.name}, file.parent
+    if "source" not in metadata:
+        return metadata
+    path = Path(metadata["source"])
     with suppress(RuntimeError):  # no such home
         path = path.expanduser()
     in_folder = folder.absolute() / path
     if len(path.parts) == 1 and not in_folder.exists():  # only the name of a file elsewhere
-        return about
-    return about | {"source": os.path.normpath(in_folder)}
+        return metadata
+    return metadata | {"source": os.path.normpath(in_folder)}
 
 
 def portable(source: str, folder: Path) -> str:
@@ -104,8 +104,8 @@ def about_the_robot(run: RunData) -> Iterator[str]:
 
 def _description(run: RunData) -> Description:
     """Return the robot's file from the texts of the run; DescriptionError if there is none."""
-    description = check(run.about.get("urdf", "").encode(), run.about.get("source", "the run's URDF"))
-    of_reading = filter(None, run.about.get("findings", "").split("\n"))  # they cannot be found from the URDF alone
+    description = check(run.metadata.get("urdf", "").encode(), run.metadata.get("source", "the run's URDF"))
+    of_reading = filter(None, run.metadata.get("findings", "").split("\n"))  # they cannot be found from the URDF alone
     return replace(description, findings=tuple(dict.fromkeys((*of_reading, *description.findings))))
 
 
@@ -130,12 +130,12 @@ def robot_of(run: RunData) -> Robot:
     Raises:
         QueryError: If the run does not come from a URDF, or its texts do not fit together.
     """
-    about = run.about
-    if "urdf" not in about:
+    metadata = run.metadata
+    if "urdf" not in metadata:
         raise QueryError("the run contains no URDF, so there is no robot to show; simulate one that rd.load returns")
     robot = Robot(_description(run))
     try:
-        robot = _edited(robot, json.loads(about["edits"]))
+        robot = _edited(robot, json.loads(metadata["edits"]))
     except (KeyError, TypeError, ValueError):
         raise QueryError("the edits in the run cannot be read; simulate again") from None
     if robot.joint_names != run.joint_names:

@@ -24,6 +24,8 @@ from robot_dyn.simulation.results.samples import root_mean_square
 from robot_dyn.simulation.results.statistics import Accuracy, Statistics
 from robot_dyn.simulation.run.outcome import Outcome
 
+_DESCRIBED = "robot", "edits", "settings", "run", "versions"  # metadata that a table repeats
+
 
 @final
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class RunData(Derived):
         t: Sample times, (m,), in [s].
         q, v, u: Positions, velocities and actuation, (m, n) or (B, m, n); None if not recorded.
         statistics: Steps, evaluations and times.
-        about: Texts from which the run can be repeated: URDF, edits, settings, versions.
+        metadata: Texts from which the run can be repeated: URDF, edits, settings, versions.
     """
 
     joint_names: tuple[str, ...]
@@ -99,7 +101,7 @@ class RunData(Derived):
     v: np.ndarray | None
     u: np.ndarray | None
     statistics: Statistics
-    about: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -153,9 +155,9 @@ def attributes(run: RunData) -> dict[str, str]:
 
     They contain no path of this machine.
     """
-    about = {name: run.about[name] for name in ("robot", "edits", "settings", "run", "versions") if name in run.about}
+    metadata = {name: run.metadata[name] for name in _DESCRIBED if name in run.metadata}
     lines = [line for line in run.summary.splitlines() if not line.startswith("time: ")]
-    return {"title": "run of robot_dyn", "method": run.statistics.method} | about | {"summary": "\n".join(lines)}
+    return {"title": "run of robot_dyn", "method": run.statistics.method} | metadata | {"summary": "\n".join(lines)}
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -18,7 +18,7 @@ from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import LONGEST_S
 
-FORMAT = 9
+FORMAT = 10
 RUN = FileKind("a run file", ".npz", b"PK\x03\x04")
 REMEDY = "write one with run.save('run.npz') or robot-dyn simulate … -o run.npz"
 
@@ -32,13 +32,13 @@ class RunFileError(RobotDynError):
 
 def write_run(run: TrajectoryData, path: Path) -> Path:
     """Write a run as a run file, completely or not at all; raise a RunFileError if that fails."""
-    return run_format(type(run)).save(replace(run, about=packed(run.about, path.parent)), path)
+    return run_format(type(run)).save(replace(run, metadata=packed(run.metadata, path.parent)), path)
 
 
-def version_remedy(about: Mapping[str, object]) -> str:
+def version_remedy(header: Mapping[str, object]) -> str:
     """Return the remedy for a run file of another format, from its JSON."""
-    value = about.get("value", about)  # in formats up to 6 the texts are outside
-    texts = value.get("about") if isinstance(value, dict) else None
+    value = header.get("value", header)  # in formats up to 6 the texts are outside; "about" up to 9
+    texts = value.get("metadata", value.get("about")) if isinstance(value, dict) else None
     versions = texts.get("versions") if isinstance(texts, dict) else None
     return f"read it with the version that wrote it: {shorten(str(versions or 'unknown'))}"
 

@@ -14,17 +14,17 @@ class Statistics:
 
     Attributes:
         method: Name of the integration method.
-        step_s: Its step, or 0 if it chose its own.
+        step_s: Step of the method, in [s]; 0 if it chooses its own steps.
         steps: Number of steps.
-        evaluations: Evaluations of the equation of motion, without those for its Jacobian.
+        evaluations: Evaluations of the equation of motion, excluding those for its Jacobian.
         wall_s: Time of the run itself, in [s].
         companions_s: Time of the error estimate, in [s].
-        engine: The loop that ran, with the reason if another was possible.
+        engine: The loop that ran; with the reason for it, if another loop was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it, in [s].
         samples_s: Time after the run, for quantities at its samples that cannot be computed later, in [s].
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
-        user_code: Parts of the setup that are user-defined code, by name; each run calls them.
+        user_code: Names of the user-defined parts of the setup, which each run calls.
     """
 
     method: str
@@ -49,12 +49,12 @@ class Accuracy:
     Attributes:
         requested: Largest error of q over joints and times, in [rad] and [m].
         estimated: Estimated error of the run, in [rad] and [m].
-        rtol: Chosen tolerance, atol is a hundredth of it; 0 for a method of fixed step.
+        rtol: Chosen relative tolerance, with atol a hundredth of it; 0 for a method with a fixed step.
         run: Evaluations of the run.
         pilots: Evaluations of the runs before it, with their error estimates.
         check: Evaluations of the error estimate of the run.
-        digit_more, digit_less: Evaluations of a run with a ten times smaller, or larger, error, by the order of the
-            method.
+        digit_more, digit_less: Predicted evaluations of a run with a ten times smaller, or larger, error, from the
+            order of the method.
     """
 
     requested: float
@@ -68,7 +68,7 @@ class Accuracy:
 
     @property
     def margin(self) -> float:
-        """The requested over the estimated error: 2 or more, 1 or more at the least tolerance; inf for no error."""
+        """Requested over estimated error: at least 2, or at least 1 at the smallest tolerance; inf for no error."""
         return self.requested / self.estimated if self.estimated > 0 else inf
 
     def __str__(self) -> str:
@@ -76,6 +76,6 @@ class Accuracy:
         return (
             f"requested {self.requested:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
             f" {self.run} evaluations,"
-            f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
-            f" {self.digit_less:.0f}"
+            f" pilots {self.pilots}, check {self.check}; one digit more would take about {self.digit_more:.0f}, one"
+            f" less {self.digit_less:.0f}"
         )

@@ -26,7 +26,7 @@ def summary(run: TrajectoryData) -> str:
     lines = [
         opening + _after(run.outcome.text),
         *([] if run.acting is None else [f"effects: {', '.join(run.acting) or 'none'}"]),
-        *([f"right angles, in machine code: {run.about['right_angles']}"] if "right_angles" in run.about else []),
+        *([f"right angles, in machine code: {run.metadata['right_angles']}"] if "right_angles" in run.metadata else []),
         f"energy ledger: {residual}" + _after(run.leak) if ledger.known else "energy ledger: was not recorded",
         f"error of q [{unit}]: {run.error or _not_estimated(run)}",
         *about_the_robot(run),
@@ -66,7 +66,7 @@ def _not_estimated(run: TrajectoryData) -> str:
     """Return that no error was estimated, and why."""
     if run.outcome.ending is Ending.STOPPED:
         return "not estimated (the run was stopped)"
-    return f"not estimated ({'a run of rollouts' if 'run' in run.about else 'estimate_error is False'})"
+    return f"not estimated ({'a run of rollouts' if 'run' in run.metadata else 'estimate_error is False'})"
 
 
 def _events_text(events: tuple[Occurrence, ...]) -> str:

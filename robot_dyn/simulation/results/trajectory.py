@@ -58,7 +58,7 @@ class Trajectory(TrajectoryData):
         outcome: Reason and time of the end.
         statistics: Steps, evaluations and times.
         error: Estimated error; None without an estimate.
-        about: Texts from which the run can be repeated: URDF, its path, edits, settings, scene, versions; the
+        metadata: Texts from which the run can be repeated: URDF, its path, edits, settings, scene, versions; the
             controlled frame and the file that it was read from, if any.
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.

@@ -148,7 +148,7 @@ def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
         plant, controller = runs._parts(setup, run)
         of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]})
-        for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
+        for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended_s[run]], units(runs)):
             by_joint.setdefault(remark.joint, []).append((run, remark))
     for pairs in by_joint.values():
         worst, remark = max(pairs, key=lambda pair: pair[1].limit or 0.0)
@@ -173,7 +173,7 @@ def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
 def worst_of(runs: RolloutsData, remarks: tuple[Remark, ...], errors: np.ndarray | None) -> int:
     """Return the number of the run to examine first, see `Rollouts.worst`."""
     if runs.diverged.any():
-        return int(np.where(runs.diverged, runs.ended, np.inf).argmin())
+        return int(np.where(runs.diverged, runs.ended_s, np.inf).argmin())
     for remark in remarks:
         if remark.kind is RemarkKind.CHATTER:
             return remark.runs[0]

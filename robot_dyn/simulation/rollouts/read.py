@@ -41,4 +41,4 @@ def read(path: str | Path) -> Trajectory | Rollouts:
     if reader and read_start(path, len(RUN.start), RunFileError, REMEDY) != RUN.start:
         raise RunFileError(f"{path}: is not a run file (.npz); {reader}")
     run = run_format(Trajectory).load(path, rollouts_format(Rollouts))
-    return replace(run, about=unpacked(run.about, path))
+    return replace(run, metadata=unpacked(run.metadata, path))

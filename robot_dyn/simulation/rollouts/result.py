@@ -28,7 +28,7 @@ from robot_dyn.simulation.rollouts.run_file import write_rollouts
 from robot_dyn.simulation.rollouts.table import columns, samples
 from robot_dyn.simulation.run.outcome import Reason
 
-_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
+_SHARED = ("joint_names", "t", "statistics", "sources", "metadata", "setup", "uncut", "saved", "numbers")  # by all runs
 _MOST_DRAWN = 2000  # largest number of runs for the quantiles in a notebook
 _QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
@@ -52,7 +52,7 @@ class Rollouts(RolloutsData):
         evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
         statistics: Statistics of the longest run; the time is for all runs.
         sources: Names of the sources of work: the control and the effects without a potential.
-        about: Texts common to all runs, as in `Trajectory`, without `varied`.
+        metadata: Texts common to all runs, as in `Trajectory`, without `varied`.
         varied: Values that differ from run to run, by name, (B, n).
         setup: Setup shared by all runs; None for runs read from a file.
         uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
@@ -188,21 +188,21 @@ class Rollouts(RolloutsData):
             lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one differs from simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
-            lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.outcome(run).text}")
+            lines.append(f"run {run} diverged at t = {self.ended_s[run]:g} s; {self.outcome(run).text}")
         counted = len(self) > 1
         lines += lines_of(remark if counted else replace(remark, runs=()) for remark in self.remarks)
         errors = self.rms_tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
             largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""
-            lines.append(f"{of_tracking(self, 'frame' in self.about)}: {np.nanmedian(errors):.3e} rms{largest}")
+            lines.append(f"{of_tracking(self, 'frame' in self.metadata)}: {np.nanmedian(errors):.3e} rms{largest}")
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it alone"
         lines.append(f"worst run: {self.worst}{again}")
         return "\n".join(escaped(line) for line in lines)
 
     def _early(self) -> str:
         """Return how many runs ended early, and why."""
-        at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
+        at = f" by an interrupt, the first at t = {self.ended_s[self.stopped].min():g} s" if self.stopped.any() else ""
         by_event = sum(outcome.reason is Reason.TERMINAL_EVENT for outcome in self.ends)
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
         return early + (f", {by_event} ended by an event" if by_event else "")

@@ -196,7 +196,7 @@ def run_batch(
         record = Tiles(batch, checked(setup, build), passed if cuts else None).run(threads, on_progress)
     columns, sources = record.columns, tuple(setup.equation.sources)
     energy, work = columns.get("energy"), columns.get("work")
-    about = frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | origin(setup.plant.dynamics)
+    metadata = frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | origin(setup.plant.dynamics)
     return Rollouts(
         joint_names=setup.plant.dynamics.joint_names, t=record.t, q=columns.get("q"), v=columns.get("v"),
         u=columns.get("u"), kinetic=None if energy is None else energy[..., 0],
@@ -204,12 +204,12 @@ def run_batch(
         work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
         ends=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
-        about=about | setup.about, varied=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
+        metadata=metadata | setup.metadata, varied=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
         observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,
     )  # fmt: skip
 
 
-def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:
+def _setup(what: Setup | Plant | Dynamics, q0: ArrayLike | None, options: Mapping[str, Any]) -> Setup:
     """Return the setup of all runs; for a plant or robot, with the first start."""
     start = {}
     if not isinstance(what, Setup):

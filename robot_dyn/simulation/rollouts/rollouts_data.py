@@ -68,7 +68,7 @@ class RolloutsData(RunData):
         return len(self.ends)
 
     @cached_property
-    def ended(self) -> np.ndarray:
+    def ended_s(self) -> np.ndarray:
         """Time at which each run ended, (B,), in [s]."""
         return np.array([end.t for end in self.ends])
 

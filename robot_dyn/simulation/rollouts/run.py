@@ -39,9 +39,9 @@ def trajectory(runs: RolloutsData, run: int) -> Trajectory:
     work = {name: np.full(len(t), np.nan) for name in runs.sources}
     if runs.work is not None:
         work = {name: x[run, recorded] for name, x in runs.work.items()}
-    about, of_setup = runs.about | {"run": f"{run} of {len(runs)}"}, Tracking()._asdict()
+    metadata, of_setup = runs.metadata | {"run": f"{run} of {len(runs)}"}, Tracking()._asdict()
     if setup is not None:
-        about |= settings_text(setup)
+        metadata |= settings_text(setup)
         of_setup = tracking_of(setup, t, q)._asdict() | {
             "wrenches": wrenches(setup.plant, t, q), "at_stop": at_stop(setup.plant, q), "acting": acting(setup),
         }  # fmt: skip
@@ -49,7 +49,7 @@ def trajectory(runs: RolloutsData, run: int) -> Trajectory:
     return Trajectory(
         joint_names=runs.joint_names, t=t, q=q, v=v, a=a, u=u, power=dict(zip(runs.sources, power.T, strict=True)),
         ledger=Ledger(energy[:, 0], energy[:, 1], work), outcome=runs.outcome(run),
-        statistics=replace(runs.statistics, **counts), about=about, remarks=remarks_of(runs, run, setup, t, q),
+        statistics=replace(runs.statistics, **counts), metadata=metadata, remarks=remarks_of(runs, run, setup, t, q),
         extremes=runs.observed.extremes[run], **of_setup,
     )  # fmt: skip
 

@@ -14,16 +14,16 @@ from robot_dyn.simulation.results.provenance import packed
 from robot_dyn.simulation.results.run_file import REMEDY, RUN, RunFileError, are_times, version_remedy
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 
-FORMAT = "rollouts 6"
+FORMAT = "rollouts 7"
 
 Runs = TypeVar("Runs", bound=RolloutsData)
 
 
 def write_rollouts(runs: RolloutsData, path: Path, overview: Overview) -> Path:
     """Write rollouts as a run file, completely or not at all; raise a RunFileError if that fails."""
-    about = packed(runs.about, path.parent)
+    metadata = packed(runs.metadata, path.parent)
     return rollouts_format(type(runs)).save(
-        replace(runs, about=about, ends=runs.outcomes, saved=overview, setup=None, numbers=None), path
+        replace(runs, metadata=metadata, ends=runs.outcomes, saved=overview, setup=None, numbers=None), path
     )
 
 
@@ -33,7 +33,7 @@ def _check(runs: RolloutsData, members: Members) -> None:
         raise StoreError(f"arrays are of {members.lengths['n']} joints, 'joint_names' of {len(runs.joint_names)}")
     if not are_times(runs.t) or not len(runs.t):
         raise StoreError("the times of member 't' are not finite, or do not grow")
-    if not all(map(are_times, runs.ended[:, None])):
+    if not all(map(are_times, runs.ended_s[:, None])):
         raise StoreError("the times in 'ends' are not those of runs")
     numbered = (number for remark in (() if runs.saved is None else runs.saved.remarks) for number in remark.runs)
     if len(runs.observed.levels) != runs.observed.limits.shape[1]:
@@ -45,7 +45,7 @@ def _check(runs: RolloutsData, members: Members) -> None:
     if runs.work is not None and set(runs.work) != set(runs.sources):
         raise StoreError("members 'work/…' and 'sources' have different names")
     whole = ~(runs.diverged | runs.stopped)[:, None] & (
-        (runs.t < runs.ended[:, None]) | (runs.ended >= runs.t[-1])[:, None]
+        (runs.t < runs.ended_s[:, None]) | (runs.ended_s >= runs.t[-1])[:, None]
     )
     for name in ("q", "v", "u", "kinetic", "potential"):
         array = getattr(runs, name)

@@ -25,7 +25,7 @@ def columns(runs: RolloutsData, overview: Overview) -> Iterator[Column]:
     yield from _of_parameters(runs, types)
     for key, start in (("q", runs.q0), ("v", runs.v0)):
         yield from of_joints(f"start {key}", start, key, types)
-    yield Column("ended", runs.ended, "s")
+    yield Column("ended", runs.ended_s, "s")
     yield Column("outcome", np.array([end.ending.value for end in runs.ends]))
     yield Column("reason", np.array([outcome.reason.value for outcome in runs.outcomes]))
     yield Column("steps", runs.steps)
@@ -33,7 +33,7 @@ def columns(runs: RolloutsData, overview: Overview) -> Iterator[Column]:
         yield Column(
             "rms tracking error",
             overview.rms_tracking_error,
-            "m" if "frame" in runs.about else joint_units("q", types.values()),
+            "m" if "frame" in runs.metadata else joint_units("q", types.values()),
         )
     texts = texts_by_run(overview.remarks, len(runs))
     yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))

@@ -50,9 +50,11 @@ class Reason(StrEnum):
     """
 
     IMPLAUSIBLE_SPEED = "implausible_speed"
-    """A joint moved faster than 100 times its velocity limit (100 rad/s if the file states none), or 1e6 rad/s.
+    """A joint moved faster than 100 times its velocity limit, or 1e6 rad/s or m/s.
 
-    A run by fixed steps ends here only if its energy ledger does not close. Check gains, period, step and effects.
+    If the file states no limit, 100 rad/s or m/s is assumed.
+
+    A run with fixed steps ends here only if its energy ledger does not close. Check gains, period, step and effects.
     """
 
     ENERGY_WITHOUT_SOURCE = "energy_without_source"
@@ -80,7 +82,7 @@ class Reason(StrEnum):
     """
 
     STALLED = "stalled"
-    """Error control takes steps so short that the rest of the run would need more than 1e7 of them: it is stiff.
+    """Error control takes steps so short that the rest of the run would need more than 1e7: the system is stiff.
 
     Take Rodas5P, softer effects or a larger tolerance.
     """
@@ -92,7 +94,7 @@ class Reason(StrEnum):
     """
 
     EVENTS_ACCUMULATE = "events_accumulate"
-    """Impacts or changes between sliding and sticking follow each other in ever shorter times.
+    """Impacts or changes between sliding and sticking follow each other at ever shorter intervals.
 
     Take `method="MoreauJean"` with a step, or soft stops and regularised friction.
     """
@@ -110,7 +112,7 @@ class Reason(StrEnum):
     """
 
     INTERRUPTED = "interrupted"
-    """Ctrl-C stopped the run. All samples up to there are kept."""
+    """Ctrl-C stopped the run. All samples up to that time are kept."""
 
     INTERRUPTED_IN_ESTIMATE = "interrupted_in_estimate"
     """Ctrl-C stopped the companion runs of the error estimate. The run itself is complete."""
@@ -128,7 +130,7 @@ class Outcome:
     Attributes:
         reason: The reason by name.
         t: Time of the end, in [s].
-        joint: Name of the joint it concerns: the fastest, or the one that takes part most; empty if none.
+        joint: Name of the joint it concerns: the fastest, or the one that takes part most in the motion; empty if none.
         facts: Numbers and names that explain it, by name; see `outcome.py` for those of each reason.
     """
 
@@ -162,7 +164,7 @@ _SENTENCES: Mapping[Reason, Parts] = {
     Reason.STEP_TOO_LONG: line_parts(RemarkKind.TOO_LONG),
     Reason.IMPLAUSIBLE_SPEED: (
         (*TOO_FAST, "a joint moves faster than {limit:g} rad/s or m/s: check gains and effects"),
-        ", and the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
+        "; the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
     ),
     Reason.ENERGY_WITHOUT_SOURCE: ("energy grows without a source", _FASTEST, _PERIOD),
     Reason.STATE_OVERFLOWS: ("a number overflowed", _GROWS, _FASTEST, _PERIOD),
@@ -175,12 +177,12 @@ _SENTENCES: Mapping[Reason, Parts] = {
         ": take {remedy}",
         _BENDS,
     ),
-    Reason.STAGES_NOT_FOUND: ("the stages of a step are not found", ": {error}", _FASTEST, _PERIOD, _BENDS),
+    Reason.STAGES_NOT_FOUND: ("an implicit step has no solution", ": {error}", _FASTEST, _PERIOD, _BENDS),
     Reason.EVENTS_ACCUMULATE: (
         "events accumulate at t = {t:.9g}: {changes} changes of mode in {span_s:.1e} s, the last of joint {joint!r}; "
         "take {remedy}",
     ),
-    Reason.TORQUE_NOT_FINITE: ("the controller asks for a torque that is not finite", _FASTEST, _PERIOD),
+    Reason.TORQUE_NOT_FINITE: ("the controller returned a torque that is not finite", _FASTEST, _PERIOD),
     Reason.CANNOT_EVALUATE: ("{error}, at t = {t:.9g}", _FASTEST, _PERIOD),
     Reason.INTERRUPTED: ("interrupted; all samples up to here are kept",),
     Reason.INTERRUPTED_IN_ESTIMATE: ("interrupted after the run, in its error estimate",),

@@ -2,8 +2,9 @@
 
     run = Run(setup, choose(setup));   recording = run.record()
 
-The steps are those of one of the two loops: `FixedSteps`, or `EventSteps` if they are chosen or end at events. The loop
-returns for progress, for Ctrl-C, for the observer, and for anything that only the interpreted equation can do.
+One of two loops takes the steps: `EventSteps` if the method chooses its steps or steps end at events, otherwise
+`FixedSteps`. The loop returns for progress, for Ctrl-C, for the observer, and for anything that only the interpreted
+equation can do.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Run:
         setup: The setup.
         engine: The engine of its state equation.
         pace: Length of steps, as a multiple of the step of the setup; or the times at which steps end, in [s].
-        on_progress: Called with the time reached, in [s], at each step or some ten times a second.
+        on_progress: Called with the time reached, in [s], at each step or about ten times a second.
         observer: Observer of each step, or None.
         samples: True to record samples; False for a companion run.
         max_evaluations: Number of evaluations of the equation of motion after which the run stops with `TooLong`.
@@ -91,7 +92,7 @@ class Run:
         )
 
     def run(self) -> Recording | GivesUp:
-        """Run to the end, or until the run gives up for another one to replace it."""
+        """Run to the end, or until the run gives up so that another one can replace it."""
         try:
             with np.errstate(all="ignore"):  # an overflow ends the run
                 ended = self._to_the_end()

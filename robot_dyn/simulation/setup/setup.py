@@ -66,7 +66,7 @@ class Options(TypedDict, total=False):
     step_s: float | None
     record_every_s: float
     estimate_error: bool
-    about: dict[str, str]
+    metadata: dict[str, str]
     engine: str
     events: Event | Sequence[Event]
     accuracy: Accuracy | None
@@ -90,7 +90,7 @@ class Setup(Value, Caching):
         record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
         estimate_error: True to estimate the error by companion runs. They take one to two times as long as the run,
             or five times as long if only shorter steps can show the error.
-        about: Texts stored with the run.
+        metadata: Texts stored with the run.
         engine: "interpreted"; "compiled", which runs as machine code, with right angles of the file to all digits of
             float64; or "auto", which compiles if that saves time, and uses machine code that exists already.
         events: Events to locate. A step ends at each of them, and a terminal event ends the run.
@@ -108,7 +108,7 @@ class Setup(Value, Caching):
     step_s: float | None = None
     record_every_s: float = 0.0
     estimate_error: bool = True
-    about: dict[str, str] = field(default_factory=dict, repr=False)
+    metadata: dict[str, str] = field(default_factory=dict, repr=False)
     engine: str = "auto"
     events: tuple[Event, ...] = ()
     accuracy: float | None = None
@@ -138,10 +138,10 @@ class Setup(Value, Caching):
         if self.accuracy is not None:
             self._check_accuracy(self.accuracy)
         for text in (
-            text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
+            text for pair in instance("metadata", self.metadata, dict, "give texts by name").items() for text in pair
         ):
-            instance("about", text, str, "give texts by name")
-        object.__setattr__(self, "about", dict(self.about))
+            instance("metadata", text, str, "give texts by name")
+        object.__setattr__(self, "metadata", dict(self.metadata))
         if self.method.controls_error and self.step_s is not None:
             raise QueryError(no_step(self.method.name))
         choice("engine", self.engine, ENGINES)

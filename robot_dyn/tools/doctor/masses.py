@@ -54,7 +54,7 @@ def beyond_reach(document: Document, robot: Robot, others: Iterable[Finding]) ->
 
 
 def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """Return the findings that `load` reports too."""
+    """Yield the findings that `load` also reports."""
     for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
         yield _of_words(Severity.ERROR, "inertia_missing", text)
     for text in doctor.for_other_programs(stated, robot.description):
@@ -68,7 +68,7 @@ def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
 
 
 def _negligible(stated: Structure) -> set[str]:
-    """Return links with negligible mass and moments, such as 1e-8 of a frame: M is not affected."""
+    """Return the links whose mass and moments are too small to affect M, for example 1e-8 kg on a frame."""
     heaviest = max((link.mass for link in stated.links.values()), default=0.0)
     largest = max((float(np.trace(link.inertia)) for link in stated.links.values()), default=0.0)
     return {
@@ -87,7 +87,7 @@ def _of_words(severity: Severity, kind: str, text: str) -> Finding:
 
 
 def _massless(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """Report bodies without mass: an error if they have a shape or M is singular; in a wrist they are intended."""
+    """Report bodies without mass: an error if they have a shape or M is singular, else a warning, as in a wrist."""
     for text in doctor.massless_bodies(stated):
         finding = _of_words(Severity.WARNING, "mass_missing", text)
         links = next((links for links in stated.bodies.values() if finding.where == f"link {links[0]!r}"), ())
@@ -97,7 +97,7 @@ def _massless(document: Document, robot: Robot, stated: Structure) -> Iterator[F
 
 
 def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]:
-    """Report moving links with mass and a zero principal moment, which other programs refuse."""
+    """Report moving links with mass and a zero principal moment, which other programs reject."""
     moving = {name: link for name, link in stated.links.items() if link.mass > 0 and name not in stated.base}
     moments = {name: np.linalg.eigvalsh(link.inertia) for name, link in moving.items()}
     points = [name for name, (_, _, most) in moments.items() if most == 0 and _has_shape(document, name)]
@@ -111,8 +111,8 @@ def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]
         elif abs(least) <= _NOTHING * most:
             yield document.finding(
                 Severity.NOTE, "inertia_zero", document.named("link", name),
-                f"its least principal moment is 0, like that of a rod or a point of {moving[name].mass:g} kg, which"
-                " MuJoCo refuses",
+                f"its smallest principal moment is 0, like that of a rod or a point of {moving[name].mass:g} kg, which"
+                " MuJoCo rejects",
                 "give it the moments of a body with some width",
             )  # fmt: skip
 
@@ -123,7 +123,7 @@ def _has_shape(document: Document, name: str) -> bool:
 
 
 def _merged(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """Report merged bodies with impossible inertia, even if that of each link is possible."""
+    """Report merged bodies with an impossible inertia, even if the inertia of each link is possible."""
     for joint, body in zip(robot.model.names[1:], list(robot.model.inertias)[1:], strict=True):
         links = next((links for name, links in stated.bodies.items() if joint.endswith(name)), ())
         if len(links) > 1 and body.mass > 0 and (why := implausibility(body.mass, body.lever, body.inertia)):

@@ -1,9 +1,10 @@
-"""Lengths out of proportion to the robot: origins and centres of mass, most often in millimetres.
+"""Origins and centres of mass out of proportion to the robot, most often because they are in millimetres.
 
     |xyz| > 100 times the median distance between a moving joint and its parent link
 
-In an arm of several joints, a centre of mass is also out of proportion beyond twice the longest of these distances and
-0.3 m, the length of a tool. This is an error, because M is then wrong by a factor.
+In an arm with at least 3 moving joints, so is a centre of mass farther away than twice the longest of these distances
+and 0.3 m, the length of a tool. It is an error if a moving joint carries its mass, because M is then wrong by a factor;
+all else is a warning.
 """
 
 from __future__ import annotations

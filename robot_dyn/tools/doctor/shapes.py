@@ -2,7 +2,7 @@
 
     ½ tr I ≤ m max |x − c|²   for a mass m with centre c anywhere within the shape
 
-Shapes are taken from <collision>, or else from <visual>; `inertia_bounds` has the bound in each direction.
+Shapes are taken from <collision>, or else from <visual>. `inertia_bounds` contains the bound in each direction.
 [Wensing, Kim, Slotine 2018, §III-B]
 """
 
@@ -98,7 +98,7 @@ def _shape(pieces: tuple[Piece, ...]) -> Shape:
 
 
 def _of_piece(piece: Piece) -> MassProperties | None:
-    """Return a closed surface as a solid; any other, or one with overlapping parts, as its convex hull."""
+    """Return the mass properties of a piece at 1 kg/m³: of the solid if closed without overlaps, else of the hull."""
     vertices, faces = piece.mesh.vertices.astype(float), piece.mesh.faces.astype(int)
     try:
         closed = surface.solid(vertices, faces)
@@ -109,7 +109,7 @@ def _of_piece(piece: Piece) -> MassProperties | None:
 
 
 def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
-    """Report masses and inertias that their shapes cannot have at any density."""
+    """Report oversized shapes, and masses and inertias that do not fit the shape of their link."""
     stated, reach = structure_of(robot.description, robot.edits), _reach(robot)
     links = stated.links
     for name, shape in of.items():
@@ -143,8 +143,8 @@ def of_one_density(document: Document, robot: Robot, of: dict[str, Shape]) -> It
         total = sum(link.mass for link in links.values())
         yield document.finding(
             Severity.NOTE, "density_uniform", document.root,
-            f"{len(alike)} of {len(mass_of)} links weigh {median:.4g} kg/m³ of their shapes, to 1 %, {total:.4g} kg in"
-            " total: computed from one material, which is unlikely for an arm with motors and gears",
+            f"{len(alike)} of {len(mass_of)} links have a density of {median:.4g} kg/m³ within 1 % ({total:.4g} kg in"
+            " total): computed from one material, which is unlikely for an arm with motors and gears",
             "compare the total with the data sheet; Robot.with_(mass_scale=…) scales all masses",
         )  # fmt: skip
 
@@ -226,7 +226,7 @@ def directions(
     package_dirs: Iterable[str | Path],
     findings: Iterable[Finding],
 ) -> Iterator[Finding]:
-    """Report links with more second moment along a direction than their mass can have within visual and collision.
+    """Report links with more second moment along a direction than their mass can have within their shapes.
 
     Links whose mass, centre or moments are doubtful for another reason are left out.
     """
@@ -240,8 +240,8 @@ def directions(
             inertial = document.named("link", name).find("inertial")
             yield document.finding(
                 severity, "inertia_direction", inertial,
-                f"along one direction its moments need {ratio:.3g} times the second moment that {body.mass:g} kg can"
-                " have within its shape",
+                f"along one direction its moments imply a second moment {ratio:.3g} times the largest that"
+                f" {body.mass:g} kg can have within its shape",
                 "correct the moments: their axes, the signs of the products, or the numbers",
             )  # fmt: skip
 
@@ -249,7 +249,10 @@ def directions(
 def bodies(
     robot: Robot, of: dict[str, Shape], package_dirs: Iterable[str | Path], names: Container[str]
 ) -> dict[str, Body]:
-    """Return links with mass and moments for their bounds; links that the first shape excludes get all their shapes."""
+    """Return the links with mass and moments as bodies, with the points of their shapes.
+
+    If the moments do not fit the first shape, the points of the visual shape are added.
+    """
     inertials = {link.get("name"): link.find("inertial") for link in robot.description.element.iterfind("link")}
     links = structure_of(robot.description, robot.edits).links
     result = {
@@ -324,5 +327,5 @@ def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
                 Severity.NOTE if name in stated.base else Severity.WARNING, "com_outside", inertial,
                 f'its centre of mass "{" ".join(xyz.split())}" m is {away + room:.2g} m outside its'
                 " shape",
-                "correct the origin of its <inertial>: it is that of the centre of mass in the frame of the link",
+                "correct the origin of its <inertial>: the position of the centre of mass in the frame of the link",
             )  # fmt: skip

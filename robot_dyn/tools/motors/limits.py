@@ -113,7 +113,9 @@ def outside_positions(
     for i, name in enumerate(robot.joint_names):
         below, above = lower[i] - extremes.least[i], extremes.greatest[i] - upper[i]
         if max(below, above) > _BEYOND:
-            q, t = (extremes.least, extremes.at_least) if below > above else (extremes.greatest, extremes.at_greatest)
+            q, t = (
+                (extremes.least, extremes.least_at_s) if below > above else (extremes.greatest, extremes.greatest_at_s)
+            )
             where = f"{q[i]:.6g} {of_joint('rad', types[i])} at {at.format(t[i])}"
             yield f"{name} is at {where}, outside its limits {lower[i]:.6g} to {upper[i]:.6g}"
 

@@ -1,4 +1,4 @@
-"""The result of a stress test: worst configurations, limits and judged runs, with the data to repeat them."""
+"""Result of a stress test: worst configurations, limits and judged runs, with the data to reproduce them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class WorstCase:
     def at(
         self, typical: float, random: float, searched: float, state: Mapping[str, np.ndarray], minimal: float
     ) -> WorstCase:
-        """Return the case with its values; the largest one may be at the state of few digits."""
+        """Return the case with its values; `searched` is raised to `minimal` if that is larger."""
         sizes = {"typical": typical, "random": random, "searched": max(searched, minimal), "minimal": minimal}
         return replace(self, **sizes, state={name: x.tolist() for name, x in state.items()})
 
@@ -71,7 +71,7 @@ class WorstCase:
 @final
 @dataclass(frozen=True)
 class Limit:
-    """A limit at which something fails first.
+    """The smallest step, gain, speed or payload at which something fails.
 
     Attributes:
         of: "step", "gain", "speed" or "payload".
@@ -101,14 +101,14 @@ class Limit:
 @final
 @dataclass(frozen=True)
 class JudgedRun:
-    """A random run whose error estimate was compared with a better run.
+    """A random run whose error estimate was compared with a more accurate run.
 
     Attributes:
         what: Effects, control and method.
         duration_s: Duration, in [s].
         estimated: Estimated error of q, in [rad] or [m]; nan without an estimate.
-        true: Largest distance from the better run, up to the end of the estimate.
-        unsure: Largest distance of two better runs from each other in this time.
+        true: Largest distance from the more accurate run, up to the end of the estimate.
+        unsure: Largest distance between two more accurate runs in this time.
         report: Report of the run about its error, or its outcome.
         misleads: True if there is no warning, and the estimate is below 0.3 of the true error.
         setup: Setup of the run.
@@ -130,7 +130,7 @@ Finding = WorstCase | Limit | JudgedRun
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Stress(Result):
-    """The worst cases and first limits of an arm, and failures of the library to report them.
+    """The worst cases and limits of an arm, and cases in which the library failed to predict or report them.
 
     Attributes:
         robot: Name of the robot.
@@ -186,7 +186,7 @@ class Stress(Result):
 
     @reported
     def sentence(self) -> str:
-        """Return the worst case of each kind, in one sentence."""
+        """Return the number of failures and the worst case of each kind, in one sentence."""
         parts = []
         for what in dict.fromkeys(case.what for case in self.worst):
             top = max((case for case in self.worst if case.what == what), key=lambda case: case.searched)

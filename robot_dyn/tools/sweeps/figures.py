@@ -36,7 +36,7 @@ class Run(Value):
         kinetic, potential: Energies, (m,), in [J]; None where not recorded.
         desired, tracking_error: Same as in `Trajectory`; None without a reference.
         extremes: Smallest and largest values of q, v and u over all steps, (3, 2, n).
-        ended: Time at which the run ended, in [s].
+        ended_s: Time at which the run ended, in [s].
         varied: Start, "q0" and "v0", and values of varying parameters, by name, (size,).
     """
 
@@ -49,7 +49,7 @@ class Run(Value):
     desired: np.ndarray | None
     tracking_error: np.ndarray | None
     extremes: np.ndarray
-    ended: float
+    ended_s: float
     varied: dict[str, np.ndarray]
 
     def __post_init__(self) -> None:
@@ -64,7 +64,7 @@ class Runs:
         t: Times of samples, (m,), in [s].
         q, v, u: Position, velocity, actuation, (B, m, n), nan after the end of a run; None where not recorded.
         extremes: Smallest and largest values of q, v and u over all steps, (B, 3, 2, n).
-        ended: Times at which the runs ended, (B,), in [s].
+        ended_s: Times at which the runs ended, (B,), in [s].
         known: True for samples that a run has, (B, m).
         joint_names: Names of the n joints.
     """
@@ -81,11 +81,11 @@ class Runs:
         self.joint_names, self.t = rollouts.joint_names, rollouts.t
         self.q, self.v, self.u = select(rollouts.q), select(rollouts.v), select(rollouts.u)
         self.kinetic, self.potential = select(rollouts.kinetic), select(rollouts.potential)
-        self.extremes, self.ended = rollouts.observed.extremes[chosen], rollouts.ended[chosen]
-        self.known = self.t <= self.ended[:, None] if self.q is None else np.isfinite(self.q[:, :, 0])
+        self.extremes, self.ended_s = rollouts.observed.extremes[chosen], rollouts.ended_s[chosen]
+        self.known = self.t <= self.ended_s[:, None] if self.q is None else np.isfinite(self.q[:, :, 0])
 
     def __len__(self) -> int:
-        return len(self.ended)
+        return len(self.ended_s)
 
     def __iter__(self) -> Iterator[Run]:
         return map(self.run, range(len(self)))
@@ -136,7 +136,7 @@ class Runs:
             desired=desired,
             tracking_error=tracking_error,
             extremes=self.extremes[i],
-            ended=float(self.ended[i]),
+            ended_s=float(self.ended_s[i]),
             varied=values,
         )
 

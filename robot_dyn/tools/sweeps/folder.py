@@ -50,7 +50,7 @@ class Folder:
         chunk: Number of runs in a chunk; the last chunk may have fewer.
         digest: SHA-256 of the specification.
         names: Names of varying parameters and of figures.
-        about: Versions and processor, stored in footers.
+        metadata: Versions and processor, stored in footers.
         samples: Store of samples of runs; None if samples are not kept.
     """
 
@@ -59,7 +59,7 @@ class Folder:
     chunk: int
     digest: str
     names: tuple[str, ...]
-    about: dict[str, Any] = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
     samples: SampleStore | None = None
 
     @property
@@ -121,7 +121,7 @@ class Folder:
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
         try:
             footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
-            stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.about)})
+            stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.metadata)})
             table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
             save(
                 self.file(chunk),
@@ -277,5 +277,5 @@ def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
 def folder_of(path: Path, sweep: Sweep, stated: Specification) -> Folder:
     """Return the folder of a sweep with the specification in it."""
     store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
-    names, about = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
-    return Folder(path, stated.runs, stated.chunk, stated.digest, names, about, store)
+    names, metadata = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, metadata, store)

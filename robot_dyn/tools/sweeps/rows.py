@@ -49,7 +49,7 @@ FIXED = (
         "outcome", "U8", "", f"outcome of the run: {', '.join(OUTCOMES)}", RAISED,
         lambda made: np.where(made.diverged, DIVERGED, FINISHED),
     ),
-    Column("ended", float, "s", "time at which the run ended; nan if it was not made", np.nan, lambda made: made.ended),
+    Column("ended_s", float, "s", "time of the end of the run; nan if not made", np.nan, lambda made: made.ended_s),
     Column(
         "reason", object, "", "reason of the end, a member of robot_dyn.simulation.Reason; or raised", RAISED,
         lambda made: np.array([outcome.reason.value for outcome in made.outcomes], object),

@@ -1,6 +1,6 @@
-"""Distributions, figures and samples as texts such as "uniform(low=0, high=3)", in scenes and on the command line.
+"""Distributions, figures and samples written as text, as in scenes and on the command line.
 
-A text is a name with literal arguments. It is parsed, never evaluated.
+A text is a name, or a call with literal arguments, for example "uniform(low=0, high=3)". It is parsed, never evaluated.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TypeVar
 from robot_dyn.foundations import SweepError, nearest, shorten, shown
 
 Result = TypeVar("Result")
-_MOST = 10_000  # largest number of characters
+_MOST = 10_000  # largest number of characters of a text
 _EXAMPLES = {
     "distribution": "uniform(low=0, high=3)",
     "figure": "rms_tracking_error() or peak('u'), or an import path such as 'my_figures:settling'",
@@ -32,7 +32,7 @@ def called(what: str, text: object, functions: Mapping[str, Callable[..., Result
     Raises:
         SweepError: If the text is not a call, its name is unknown, or the arguments are invalid.
     """
-    wrong = SweepError(f"{what}: {shorten(text)!r} is not a name with numbers, such as {_EXAMPLES[what]}")
+    wrong = SweepError(f"{what}: {shorten(text)!r} is not a name with arguments, for example {_EXAMPLES[what]}")
     if not isinstance(text, str) or len(text) > _MOST:
         raise wrong
     try:
@@ -56,14 +56,14 @@ def call_of(
 ) -> Result:
     """Call a function by name; raise a SweepError if it is unknown or does not accept the arguments."""
     if name not in functions:
-        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; such as {_EXAMPLES[what]}")
+        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; for example {_EXAMPLES[what]}")
     function = functions[name]
     try:
         bound = signature(function).bind(*arguments, **by_name)
     except TypeError as error:
-        given = ", ".join([*map(shown, arguments), *(f"{key}={shown(x)}" for key, x in by_name.items())])
+        listed = ", ".join([*map(shown, arguments), *(f"{key}={shown(x)}" for key, x in by_name.items())])
         form = ", ".join(map(_written, signature(function).parameters.values()))
-        raise SweepError(f"{shorten(f'{name}({given})')}: {error}; write {name}({form})") from None
+        raise SweepError(f"{shorten(f'{name}({listed})')}: {error}; write {name}({form})") from None
     return function(*bound.args, **bound.kwargs)
 
 

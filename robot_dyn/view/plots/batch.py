@@ -171,7 +171,7 @@ def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.n
         ends = np.array([t[np.isfinite(line)][-1] for line in lost if np.isfinite(line).any()])
         cells.append(Cell(name, TIME, y, (Curve("median", t, median), *lines), bands=shades, lost=ends))
     rows = in_rows(cells, int(view.width / _CELL_MM))
-    early = int(((view.runs.ended < t[-1]) & ~gone).sum())
+    early = int(((view.runs.ended_s < t[-1]) & ~gone).sum())
     counted = f"; {early} ended early, bands are of those still running" if early else ""
     many = f", {_MOST_LINES} of them drawn" if gone.sum() > _MOST_LINES else ""
     return Panel(f"{what} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows)

@@ -28,7 +28,7 @@ from robot_dyn.view.series import effort_limits
 if TYPE_CHECKING:
     from robot_dyn.view.plots.shown import Figure
 
-MOST_JOINTS = 64  # that one figure shows
+MOST_JOINTS = 64  # largest number of joints in one figure
 STYLES = ("screen", "paper")
 
 
@@ -44,29 +44,31 @@ def plot(
     x: str | None = None,
     y: str | None = None,
 ) -> Figure:
-    """Return a figure of a run: an overview on one page, or the parts that are named, one under the other.
+    """Return a figure of a run: an overview on one page, or the named parts, one below the other.
 
-    Of a batch: fans of quantiles, outcomes, a histogram and a scatter of a figure of each run, those that apply.
+    The figure of a batch shows fans of quantiles, outcomes, and a histogram and a scatter of one number per run;
+    parts that do not apply are omitted.
 
-    The overview of up to 8 joints is not higher than A4 at any width; text has 7 to 9 pt.
+    The overview of up to 8 joints is not higher than A4 at any width. Text is 7 to 9 pt high.
 
     Args:
-        run: With m samples of n joints; or rollouts.
-        *names: overview, joints, torques, energy, tracking, phase, error_growth; of rollouts fan, tracking, outcomes,
+        run: A run with m samples of n joints, or rollouts.
+        *names: overview, joints, torques, energy, tracking, phase, error_growth; for rollouts fan, tracking, outcomes,
             histogram, scatter.
-        only: As *names.
-        joints: Names of the joints to show; all if not given.
-        limits: Effort limits, shape (n,), in [N m] or [N], inf for none; if not given, those
-            that acted in the run, and for joints without one those of its URDF.
-        theme: For "light" or "dark" screens.
-        style: "paper" has thin lines, no title, and colours and dashes that a grey print keeps apart.
+        only: The same as *names.
+        joints: Names of the joints to show; all by default.
+        limits: Effort limits, shape (n,), in [N m] or [N], inf for none. By default, the limits that acted in the run;
+            for joints without one, the limits of its URDF.
+        theme: "light" or "dark", for screens.
+        style: "paper" has thin lines, no title, and colours and dashes that differ in greyscale.
         width_mm: Width, in [mm], from 80 to 1000.
-        x: Of rollouts, the column of their table over which a scatter is drawn; by default the first that was swept.
-        y: Of rollouts, the column that a histogram and a scatter show, as "largest u elbow_joint"; by default the
-            tracking error.
+        x: For rollouts, the column of their table on the x axis of a scatter; by default the first parameter that was
+            swept.
+        y: For rollouts, the column shown by a histogram and a scatter, for example "largest u elbow_joint"; by default
+            the tracking error.
 
     Raises:
-        QueryError: If a part, a joint, a style or a theme is unknown, or the limits or the width cannot be.
+        QueryError: If a part, a joint, a style or a theme is unknown, or the limits or the width are invalid.
         PlotError: If the run has no samples, too many joints, or lacks what a requested part shows.
     """
     instance("run", run, TrajectoryData | RolloutsData, "give the trajectory of rd.simulate, or rollouts")
@@ -83,17 +85,17 @@ def plot(
     look, width = _style(theme, style), _width(width_mm)
     if isinstance(run, RolloutsData):
         if limits is not None:
-            raise QueryError("limits are of a run; plot(runs[0], limits=…)")
+            raise QueryError("limits= applies to a single run: plot(runs[0], limits=…)")
         return _of_batch(BatchView(run, _columns(run, shown), x, y, width), parts, look)
     if x is not None or y is not None:
-        raise QueryError("x and y name columns of rollouts; a run has none")
+        raise QueryError("x and y name columns of rollouts, but this is a single run; leave them out")
     if not len(run.t):
         raise PlotError("the run has no samples, so there is nothing to draw; simulate again")
     view = _view(run, shown, limits, width)
     with np.errstate(all="ignore"):  # the last samples of a run that diverged may overflow
         panels = [panel for name in parts or ("overview",) for panel in PLOTS[name](view)]
         end = run.outcome
-        title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
+        title = f"{run.metadata.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
         remarks = [text for text in (end.text, *remark_lines(run.remarks)) if text]
         return draw(panels, title, remarks, look, width, end.ending is Ending.DIVERGED)
 
@@ -109,12 +111,12 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
                 if parts:
                     raise
     first, *more = view.runs.summary.splitlines()
-    title = f"{view.runs.about.get('robot', 'runs')}: {first}"
+    title = f"{view.runs.metadata.get('robot', 'runs')}: {first}"
     return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.all()))
 
 
 def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
-    """One name or several."""
+    """Return the names given as one name or several."""
     if isinstance(given, str):
         return (given,)
     if (names := () if given is None else several(given)) is None:
@@ -127,7 +129,7 @@ def _style(theme: str, style: str) -> Style:
     if choice("style", style, STYLES) == "screen":
         return Style(THEMES[theme])
     if theme != "light":
-        raise QueryError("style='paper' is black on white; leave theme='dark' out")
+        raise QueryError("style='paper' is black on white; omit theme='dark'")
     return PAPER
 
 
@@ -143,15 +145,15 @@ def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tupl
     columns = tuple(i for i, name in enumerate(run.joint_names) if name in shown)
     if not 0 < len(columns) <= MOST_JOINTS:
         count = f"{len(columns)} joints, and one figure shows 1 to {MOST_JOINTS}"
-        raise PlotError(f"{count}; name those to show, such as joints={list(run.joint_names[:2])}")
+        raise PlotError(f"{count}; select some, for example joints={list(run.joint_names[:2])}")
     return columns
 
 
 def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None, width: float) -> View:
-    """Types of joints and limits by the URDF of the run; without one both units are named."""
+    """Return the view of a run, with joint types and limits from its URDF; without a URDF, both units are named."""
     columns = _columns(run, shown)
     try:
-        joints = structure_of(check(run.about.get("urdf", "").encode(), "the run's URDF"), Edits()).joints
+        joints = structure_of(check(run.metadata.get("urdf", "").encode(), "the run's URDF"), Edits()).joints
     except DescriptionError:
         joints = {}
     known = [joints.get(name) for name in run.joint_names]
@@ -167,5 +169,5 @@ def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None
 
 
 def _known(limits: np.ndarray) -> np.ndarray:
-    """Limits, inf where there is none: 0 and nan state none."""
+    """Return the limits, with inf for joints without one: 0, nan and 1e300 or more mean no limit."""
     return np.where((limits > 0) & (limits < 1e300), limits, np.inf)

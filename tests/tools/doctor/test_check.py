@@ -425,7 +425,7 @@ def test_masses_of_one_density_are_told(scatter: float, found: bool) -> None:
     kinds = {each.kind: each for each in checked(chain(masses, edges).encode(), "cubes.urdf").findings}
     assert ("density_uniform" in kinds) is found
     if found:
-        assert "5 of 5 links weigh" in kinds["density_uniform"].what
+        assert "5 of 5 links have a density of" in kinds["density_uniform"].what
 
 
 def test_masses_of_equal_links_are_no_sign_of_one_material() -> None:

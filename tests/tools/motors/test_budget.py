@@ -90,7 +90,7 @@ def test_a_joint_without_load_has_the_closed_forms_of_the_quintic() -> None:
     (joint,) = budget(rd.control.quintic([0.2], [0.2 + delta], T), FREE).joints
     assert joint.peak == pytest.approx(INERTIA * 10 / np.sqrt(3) * delta / T**2, rel=1e-9)
     assert joint.rms == pytest.approx(INERTIA * np.sqrt(120 / 7) * delta / T**2, rel=1e-9)
-    assert joint.speed == pytest.approx(15 / 8 * delta / T, rel=1e-9) and joint.speed_at == pytest.approx(T / 2)
+    assert joint.speed == pytest.approx(15 / 8 * delta / T, rel=1e-9) and joint.speed_at_s == pytest.approx(T / 2)
     kinetic = INERTIA / 2 * (15 / 8 * delta / T) ** 2
     assert (joint.energy, joint.regenerated) == pytest.approx((kinetic, kinetic), rel=1e-5)  # P has a kink
     assert joint.mean_power == pytest.approx(0.0, abs=1e-9)
@@ -126,7 +126,7 @@ def test_a_joint_breaks_away_against_its_load_and_static_friction() -> None:
     motion = rd.control.quintic([0.7], [0.9], 5.0)
     load = float(ROD.N(np.array([0.7]))[0])
     (joint,) = budget(motion, plant, effort=100.0).joints
-    assert load > 0 and joint.static_friction == 4.0 and joint.breakaway_at == 0.0
+    assert load > 0 and joint.static_friction == 4.0 and joint.breakaway_at_s == 0.0
     assert joint.breakaway == pytest.approx(load + 4.0, rel=1e-9)
     found = budget(motion, plant, effort=(joint.breakaway + joint.peak) / 2)
     assert joint.peak < joint.breakaway and not found.fits and "to break away" in found.sentence
@@ -504,7 +504,7 @@ def test_the_command_takes_scenes_and_runs_and_writes_figure_and_table(files: Pa
         assert ran("budget", what).returncode == 0
     done = ran("budget", run, "-o", files / "b.svg", "--csv", files / "b.csv", "--dark")
     assert done.returncode == 0 and (files / "b.svg").read_bytes().startswith(b"<?xml")
-    assert (files / "b.csv").read_text(encoding="utf-8").startswith("joint,unit,peak,peak_at,")
+    assert (files / "b.csv").read_text(encoding="utf-8").startswith("joint,unit,peak,peak_at_s,")
 
 
 def test_a_run_that_simulates_its_gears_has_its_own_rotors(tmp_path: Path) -> None:

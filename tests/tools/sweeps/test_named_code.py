@@ -158,12 +158,12 @@ def test_a_folder_from_which_python_imports_is_refused(received: Path, names: st
     """Else a file of the folder would be imported for one of the library's own dependencies."""
     shutil.copy("code_of_a_test.py", received)
     (received / "pyarrow.py").write_text("open('imported', 'w')")
-    script = f"from robot_dyn.tools import sweeps as sw\nsw.read('.'{names})"
+    script = f"from robot_dyn.tools import sweeps as sw\nsw.read_sweep('.'{names})"
     said = subprocess.run([sys.executable, "-c", script], cwd=received, capture_output=True, text=True, check=False)
     assert "SweepError" in said.stderr and not (received / "imported").exists()
     for place in (received, received / "rows"):
         environment = os.environ | {"PYTHONPATH": str(place)}
-        script = f"from robot_dyn.tools import sweeps as sw\nsw.read({str(received)!r}{names})"
+        script = f"from robot_dyn.tools import sweeps as sw\nsw.read_sweep({str(received)!r}{names})"
         said = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
         assert "SweepError" in said.stderr, said.stderr
     assert not (received / "imported").exists() and not Path("imported").exists()

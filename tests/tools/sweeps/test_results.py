@@ -335,7 +335,7 @@ def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tm
         sweep = sw.Sweep("setup_with_an_event:setup", 24, {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)},
                          {"error": sw.rms_tracking_error()}, seed=2)  # fmt: skip
         rows = Work(sweep).rows(0, 24)
-        assert len(set(rows["ended"].tolist())) > 2
+        assert len(set(rows["ended_s"].tolist())) > 2
         alone = [Work(sweep).rows(i, i + 1) for i in range(0, 24, 5)]
     finally:
         sys.path.remove(str(tmp_path))
@@ -354,7 +354,7 @@ figures = {worst = "peak('tracking_error')"}
     assert (sweep.runs, sweep.seed, sweep.figures) == (70, 3, {"worst": sw.peak("tracking_error")})
     for text, said in (
         ('"my_module:f"', "would run code, but a scene is data"),
-        ("\"peak(__import__('os'))\"", "is not a name with numbers"),
+        ("\"peak(__import__('os'))\"", "is not a name with arguments"),
         ("\"peek('u')\"", "no figure 'peek'; nearest: peak"),
     ):
         path.write_text(SCENE + table.replace("\"peak('tracking_error')\"", text))

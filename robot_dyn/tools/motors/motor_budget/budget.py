@@ -152,7 +152,7 @@ def _simulated_rotors(run: Trajectory, robot: Robot) -> dict[str, float]:
     Raises:
         PlanError: If the arm has the same inertia as armature, so that the rotor counts twice.
     """
-    rotors: dict[str, float] = json.loads(run.about.get("rotors", "{}"))
+    rotors: dict[str, float] = json.loads(run.metadata.get("rotors", "{}"))
     for name, armature in zip(robot.joint_names, robot.armature.tolist(), strict=True):
         if name in rotors and same_rotor(armature, rotors[name]):
             raise PlanError(

@@ -107,7 +107,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
     t, q, v, a = grid.states(cell, x)
     split = torques_by_cause(plant, t, q, v, a)
     fastest = extreme_values(grid.motion, 1)
-    at = np.where(-fastest.least > fastest.greatest, fastest.at_least, fastest.at_greatest)
+    at = np.where(-fastest.least > fastest.greatest, fastest.least_at_s, fastest.greatest_at_s)
     gap = float(grid.length.max() * np.diff(X).max() / 2)
     return Demand(
         split=split,

@@ -1,8 +1,8 @@
-"""The path of a motion at its limits: from stop to stop as fast as they allow; pauses keep their length.
+"""The fastest motion along a given path, from stop to stop within the limits; pauses keep their length.
 
 Between two stops, `rd.tools.motors.path` plans a motion along a spline through equidistant places on the path. Stops
-are kept, because the path may have a corner there. If the result exceeds continuous torques, it is slowed down as a
-whole by the smallest sufficient factor. If the original motion fits and the new one does not, or is slower, the
+are kept, because the path may have a corner there. If the result exceeds a continuous torque limit, it is slowed down
+as a whole by the smallest sufficient factor. If the original motion fits and the new one does not, or is slower, the
 original one is returned.
 """
 
@@ -27,8 +27,8 @@ from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, through
 from robot_dyn.tools.motors.planning.path_at_limits import path
 
-_RESTS = 1e-3  # relative to the largest velocity of a joint: slower is a stop
-_TIMES, _PLACES = 4000, 80  # numbers of times of the motion, and of places of a path between two stops
+_RESTS = 1e-3  # relative to the largest velocity of a joint: anything slower is a stop
+_TIMES, _PLACES = 4000, 80  # number of sample times of a motion, and of points on the path between two stops
 _STILL = 1e-12  # relative velocity, or [rad] or [m] of motion, that counts as rest
 _SHORT = 1e-6  # relative to the longest stroke: a shorter one is rounding, or an artefact of a spline in a pause
 
@@ -36,14 +36,14 @@ _SHORT = 1e-6  # relative to the longest stroke: a shorter one is rounding, or a
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class FastestMotion(Answer):
-    """The path of a motion at its limits.
+    """The fastest motion found along the path of a given motion.
 
     Attributes:
         before_s: Duration of the original motion, in [s].
         strokes: Number of movements from stop to stop.
         distance: Largest distance from the path, in [rad] or [m].
-        slowed: Factor λ on the duration that satisfies continuous torques; 1 if it is not needed, or no λ suffices.
-        no_pace: The joint that exceeds its continuous torque at every pace, in words; empty if a pace fits.
+        slowed: Factor λ on the duration that meets the continuous torque limits; 1 if not needed, or if no λ suffices.
+        no_pace: Message about the joint that exceeds its continuous torque limit at every pace; empty if a pace fits.
         given: True if the original motion fits, and no faster one that fits was found.
         fraction: Fraction of the peak torques that it may use.
         budget: Motor budget of the motion.
@@ -76,18 +76,19 @@ class FastestMotion(Answer):
             yield f"the same path in {times}{limit}, {stops}, within {self.distance:.1g} rad or m of it:"
         yield from rest
         if self.slowed > 1:
-            yield f"slowed down by {self.slowed:.4g} to satisfy continuous torques"
+            yield f"slowed down by a factor of {self.slowed:.4g} to meet the continuous torque limits"
         if self.no_pace:
             yield self.no_pace
         yield self.budget.verdict
 
 
 def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
-    """Plan the path of a motion as fast as the limits of its budget allow, from stop to stop; pauses keep their length.
+    """Plan the fastest motion along the path of a motion, from stop to stop within the limits of its budget.
 
-    The path is kept, but not the timing: with a uniform factor, the slowest place would limit the whole motion. If the
-    result exceeds continuous torques, it is slowed down as a whole, with its pauses, by the smallest sufficient factor,
-    if there is one. If the original motion fits and the new one does not, or is slower, the original one is returned.
+    The path and the lengths of pauses are kept, the timing is not: with a uniform factor, the slowest place would limit
+    the whole motion. If the result exceeds a continuous torque limit, it is slowed down as a whole, with its pauses, by
+    the smallest sufficient factor, if there is one. If the original motion fits and the new one does not, or is slower,
+    the original one is returned.
 
     Args:
         motor_budget: The budget of a plan.
@@ -95,7 +96,7 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
 
     Raises:
         QueryError: If the budget is of a run.
-        PlanError: If an effect depends on time, or no motion is within the limits.
+        PlanError: If an effect depends on time, or no motion within the limits is found.
         MissingExtraError: If toppra is not installed.
     """
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
@@ -108,7 +109,7 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
     new_budget = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
     result = {"before_s": before, "strokes": strokes, "fraction": fraction}
     if _fits(motor_budget, fraction) and (not new_budget.fits or plan.duration_s >= before):
-        plan = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
+        plan = replace(plan, reference=motion, method="the original motion", findings=motor_budget.findings)
         return FastestMotion(**result, distance=0.0, slowed=1.0, no_pace="", given=True, budget=motor_budget, plan=plan)
     slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, new_budget))
     return FastestMotion(
@@ -122,7 +123,7 @@ def _fits(motor_budget: MotorBudget, fraction: float) -> bool:
 
 
 def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
-    """Return the exceeded limit at the best pace, in words."""
+    """Return a message about the limit that is exceeded even at the best pace."""
     joint = motor_budget.joints[pace.joint]
     limit = joint.continuous_limit
     return (

@@ -27,18 +27,18 @@ class JointBudget:
 
     Attributes:
         joint, type: Name of the joint, and its type, such as "revolute".
-        peak, peak_at: Largest |τ|, in [N m], and its time, in [s]; for a run, the time of the largest sample.
+        peak, peak_at_s: Largest |τ|, in [N m], and its time, in [s]; for a run, the time of the largest sample.
         rms: √(1/T ∫ τ² dt), in [N m].
-        speed, speed_at: Largest |v|, in [rad/s], and its time, in [s].
-        power, power_at: Largest |τ v|, in [W], and its time, in [s].
+        speed, speed_at_s: Largest |v|, in [rad/s], and its time, in [s].
+        power, power_at_s: Largest |τ v|, in [W], and its time, in [s].
         mean_power: 1/T ∫ τ v dt, in [W].
         energy: ∫ max(τ v, 0) dt, delivered by the motor, in [J].
         regenerated: ∫ max(−τ v, 0) dt, returned to the motor, in [J].
         static_friction: f_s of dry friction, in [N m]; 0 without dry friction, nan for a run.
-        breakaway, breakaway_at: Largest |τ| at which the joint leaves rest against f_s, and its time; nan if it never
+        breakaway, breakaway_at_s: Largest |τ| at which the joint leaves rest against f_s, and its time; nan if it never
             leaves rest.
         peak_limit, continuous_limit, speed_limit: The limits; inf for none.
-        of_peak: Parts of τ at `peak_at` by cause.
+        of_peak: Parts of τ at `peak_at_s` by cause.
         of_rms: Parts of `rms` by cause, 1/(T rms) ∫ τ_cause τ dt; negative for a cause that relieves the motor.
         cut: True if an effort limit cut the actuation of a run, so that the demand was higher.
     """
@@ -46,18 +46,18 @@ class JointBudget:
     joint: str
     type: str | None
     peak: float
-    peak_at: float
+    peak_at_s: float
     rms: float
     speed: float
-    speed_at: float
+    speed_at_s: float
     power: float
-    power_at: float
+    power_at_s: float
     mean_power: float
     energy: float
     regenerated: float
     static_friction: float
     breakaway: float
-    breakaway_at: float
+    breakaway_at_s: float
     peak_limit: float
     continuous_limit: float
     speed_limit: float
@@ -92,9 +92,9 @@ class JointBudget:
         if kind == "continuous":
             return f"{self.rms:.4g} of {self.continuous_limit:.4g} {unit} rms{_most(self.of_rms)}"
         if kind == "speed":
-            return f"{self.speed:.4g} of {self.speed_limit:.4g} {unit} at {self.speed_at:.4g} s"
+            return f"{self.speed:.4g} of {self.speed_limit:.4g} {unit} at {self.speed_at_s:.4g} s"
         starts = self.breakaway > self.peak
-        need, at = (self.breakaway, self.breakaway_at) if starts else (self.peak, self.peak_at)
+        need, at = (self.breakaway, self.breakaway_at_s) if starts else (self.peak, self.peak_at_s)
         more = " to break away" if starts else ", where it was cut" if self.cut else ""
         return f"{need:.4g} of {self.peak_limit:.4g} {unit} at {at:.4g} s{more or _most(self.of_peak)}"
 
@@ -110,18 +110,18 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
     starts = [max(torques, key=itemgetter(0), default=(nan, nan)) for torques in by_joint]
     values: dict[str, Sequence[float] | np.ndarray] = {
         "peak": demand.peak,
-        "peak_at": split.t[at_peak],
+        "peak_at_s": split.t[at_peak],
         "rms": rms,
         "speed": demand.speed[0],
-        "speed_at": demand.speed[1],
+        "speed_at_s": demand.speed[1],
         "power": np.abs(power[strongest, row]),
-        "power_at": split.t[strongest],
+        "power_at_s": split.t[strongest],
         "mean_power": demand.mean(power),
         "energy": delivered,
         "regenerated": regenerated,
         "static_friction": demand.friction,
         "breakaway": [torque for torque, _ in starts],
-        "breakaway_at": [t for _, t in starts],
+        "breakaway_at_s": [t for _, t in starts],
         "peak_limit": limits.effort,
         "continuous_limit": limits.continuous,
         "speed_limit": limits.velocity,

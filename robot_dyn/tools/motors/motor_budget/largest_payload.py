@@ -46,7 +46,7 @@ class LargestPayload(Answer):
         least: The smallest mass that fits, in [kg]: 0, unless the arm needs a counterweight.
         joint: The limiting joint.
         limit: The limit: "peak torque", "continuous torque", "break-away torque" or "speed".
-        at: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion.
+        at_s: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion.
         largest_share: Largest share of a torque limit with this mass, by inverse dynamics.
         resolution: Times of the check with this mass, in words.
         carried: Mass of the arm's payloads, in [kg].
@@ -58,7 +58,7 @@ class LargestPayload(Answer):
     least: float
     joint: str
     limit: str
-    at: float
+    at_s: float
     largest_share: float
     resolution: str
     carried: float
@@ -66,7 +66,7 @@ class LargestPayload(Answer):
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.com
         where = f"on {self.link} at ({x:g}, {y:g}, {z:g}) m"
-        at = "" if np.isnan(self.at) else f" at {round(self.at, 9):.4g} s"
+        at = "" if np.isnan(self.at_s) else f" at {round(self.at_s, 9):.4g} s"
         if self.mass is None:
             yield f"no payload {where} fits: the {self.limit} of {self.joint} is exceeded{at}"
         elif self.mass == inf:
@@ -87,7 +87,7 @@ class _Bound(NamedTuple):
     most: float
     joint: int = 0
     limit: str = ""
-    at: float = nan
+    at_s: float = nan
 
 
 def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)) -> LargestPayload:
@@ -115,7 +115,7 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
 
     def result(mass: float | None, least: float, bound: _Bound, share: float, demand: Demand = bare) -> LargestPayload:
         joint = robot.joint_names[bound.joint] if bound.limit else ""
-        limit = joint, bound.limit, bound.at
+        limit = joint, bound.limit, bound.at_s
         return LargestPayload(unit.frame, unit.com, mass, least, *limit, share, demand.resolution, carried)
 
     loaded, none = carrying(1.0), _Bound(-inf, inf)

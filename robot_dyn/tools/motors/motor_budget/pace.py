@@ -1,13 +1,13 @@
-"""The smallest factor λ ≥ 1 on the duration of a motion that satisfies continuous torques.
+"""The smallest factor λ ≥ 1 on the duration of a motion that meets the continuous torque limits.
 
 A motion that takes λ times as long has velocities u q̇ and accelerations u² q̈ with u = 1/λ, so
 
     ⟨τ²⟩(u) = ⟨(N + u τ_v + u² τ_a)²⟩
 
 is a polynomial of degree 4 if effects are polynomials of degree 2 in the velocity. It need not decrease with λ, because
-inertia may relieve gravity. The u that satisfy a limit form intervals between roots of ⟨τ²⟩(u) = τ_continuous², and
-the u that satisfy all limits their intersection. The function is interpolated in each octave of u at five Chebyshev
-points, exactly for such effects; for other effects, results are confirmed by the torque itself.
+inertia may relieve gravity. The u that satisfy a limit form intervals between roots of ⟨τ²⟩(u) = τ_continuous²; the
+u that satisfy all limits form their intersection. The function is interpolated in each octave of u at five Chebyshev
+points, exactly for such effects; for other effects, a result is checked against the torque itself.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Pace(NamedTuple):
 
 
 def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray) -> Pace:
-    """Return the smallest λ from 1 to 128 that satisfies continuous torques, (n,); else the λ of the smallest share."""
+    """Return the smallest λ from 1 to 128 that meets the continuous limits, (n,); else the λ of the smallest share."""
 
     def at(factor: float) -> Pace:
         shares = root_mean_squares(at_pace(motion, factor), plant) / continuous

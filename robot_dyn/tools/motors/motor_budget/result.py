@@ -37,8 +37,8 @@ class MotorBudget(Result):
 
     diagram: ClassVar[str] = "robot_dyn.tools.motors.motor_budget.diagram"
     columns: ClassVar[tuple[str, ...]] = (
-        "joint", "unit", "peak", "peak_at", "peak_limit", "rms", "continuous_limit", "speed", "speed_at", "speed_limit",
-        "power", "mean_power", "energy", "regenerated", "breakaway",
+        "joint", "unit", "peak", "peak_at_s", "peak_limit", "rms", "continuous_limit", "speed", "speed_at_s",
+        "speed_limit", "power", "mean_power", "energy", "regenerated", "breakaway",
     )  # fmt: skip
     robot: str
     motion: str
@@ -90,7 +90,7 @@ class MotorBudget(Result):
         joints = self.joints
         torque = {"joint": [x.joint for x in joints], "unit": [of_joint("N m", x.type) for x in joints]}
         speed = torque | {"unit": [of_joint("rad/s", x.type) for x in joints]}
-        at_peak, starts = {"at t [s]": [x.peak_at for x in joints]}, [x.breakaway for x in joints]
+        at_peak, starts = {"at t [s]": [x.peak_at_s for x in joints]}, [x.breakaway for x in joints]
         yield f"limits: {self.limits}"
         yield f"{self.resolution}; integrals by two rules differ by a fraction of {self.error:.1g}"
         yield ""
@@ -108,7 +108,7 @@ class MotorBudget(Result):
         yield "at the joint, without losses of motor and gear:"
         speed |= {
             "speed": [x.speed for x in joints],
-            "at t [s]": [x.speed_at for x in joints],
+            "at t [s]": [x.speed_at_s for x in joints],
             "limit": [_known(x.speed_limit) for x in joints],
             "headroom": [_percent(x.headroom["speed"], x.speed_limit) for x in joints],
             "power [W]": [x.power for x in joints],

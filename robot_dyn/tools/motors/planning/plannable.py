@@ -1,4 +1,4 @@
-"""Requirements of a path at its limits: effects of position and velocity only, and sufficient limits."""
+"""Requirements for the fastest motion along a path: effects of q and v only, and sufficient limits."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ def check_effects(plant: Plant) -> None:
     rng, n = np.random.default_rng(0), plant.dynamics.n
     q, v = rng.uniform(-1, 1, (2, 8, n))
     for effect in plant.effects:
-        why = ""
+        reason = ""
         if isinstance(effect, Stateful):
-            why = "has states"
+            reason = "has states"
         elif isinstance(effect, CarriedPayload):
-            why = "comes and goes: give the arm with the payload, arm.with_(payload=…)"
+            reason = "acts only for a part of the time: use an arm with the payload, arm.with_(payload=…)"
         elif any(0 < t < np.inf for t in effect.switches) or (
             isinstance(effect, Force)
             and np.diff([Plant(plant.dynamics, [effect]).torque(q, v, t=t) for t in _TIMES], axis=0).any()
         ):
-            why = "depends on the time"
+            reason = "depends on the time"
         elif isinstance(effect, Bound) and not isinstance(effect, EffortLimit):
-            why = "changes the torque of the motors"
-        if why:
-            raise PlanError(f"effect {effect.name!r} {why}; paths at limits need plants without such effects")
+            reason = "changes the torque of the motors"
+        if reason:
+            raise PlanError(f"effect {effect.name!r} {reason}; remove it from the plant")
 
 
 def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
@@ -43,7 +43,7 @@ def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
 
 
 def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> None:
-    """Raise a PlanError for limits whose squares overflow, and for a path without a limit on the acceleration."""
+    """Raise a PlanError for finite limits outside 1e-100 to 1e100, or if nothing limits the acceleration."""
     for name, x in (("effort", limits.effort), ("velocity", limits.velocity), ("acceleration", limits.acceleration)):
         if (wrong := np.isfinite(x) & ((x < _LEAST) | (x > _MOST))).any():
             joint, value = plant.dynamics.joint_names[int(wrong.argmax())], x[wrong][0]
@@ -60,10 +60,10 @@ def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> No
 
 
 def why_not(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> str:
-    """Return the reason why no motion exists: the joint that needs the largest share of its limit to move slowly."""
+    """Return why no motion was found: the joint that needs the largest share of its limit to move slowly."""
     s = _along(path)
     q, slope, _ = path.at(s)
-    slowly = 1e-9 * slope  # includes friction in motion
+    slowly = 1e-9 * slope  # slow motion, to include friction
     load = plant.inverse_dynamics(q, slowly, 0 * q, t=0.0) / limits.effort
     k, i = np.unravel_index(np.argmax(np.abs(load)), load.shape)
     name, limit = plant.dynamics.joint_names[i], float(limits.effort[i])
@@ -72,7 +72,7 @@ def why_not(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> str:
     )
     if abs(load[k, i]) > 1:
         return f"no motion along the path is within the limits: {needs_it}"
-    return f"no motion along the path was found; at rest {needs_it}, the largest share of all joints"
+    return f"no motion along the path was found; {needs_it}, the largest share of all joints"
 
 
 def _along(path: PiecewisePolynomial) -> np.ndarray:
