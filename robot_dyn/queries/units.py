@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.foundations.coefficients import Coefficient, declared
+from robot_dyn.foundations.coefficients import Coefficient, Jointed, declared
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from robot_dyn.queries.dynamics import Dynamics
 
 
 _ROUNDING = 1e-12  # some thousand rounding units 2⁻⁵³, which sums of terms of that size may leave instead of 0
@@ -42,9 +40,9 @@ def coefficient_unit(coefficient: Coefficient, joint_types: Iterable[str | None]
     return " or ".join(dict.fromkeys(of_joint(coefficient.unit, kind) for kind in kinds))
 
 
-def joint_types_of(dynamics: Dynamics) -> tuple[str | None, ...]:
+def joint_types_of(dynamics: Jointed) -> tuple[str | None, ...]:
     """Return the joint types of a dynamics' robot; None for each joint if it has no robot."""
-    return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+    return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * len(dynamics.joint_names))
 
 
 def joint_units(quantity: str, joint_types: Iterable[str | None]) -> str:
