@@ -28,7 +28,9 @@ def inlined(function: F) -> F:
     return function
 
 
-def evaluate(function: Callable[..., object], t: Scalar, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+def evaluate(
+    function: Callable[..., object] | int | None, t: Scalar, y: Array, p: Array, run_parameters: Array, out: Array
+) -> None:
     """Write a function of (t, y, p, run_parameters) into `out`; in machine code the function is an address.
 
     Args:
@@ -39,6 +41,7 @@ def evaluate(function: Callable[..., object], t: Scalar, y: Array, p: Array, run
         run_parameters: Parameters of each run, (O, W).
         out: Output, (r, W).
     """
+    assert callable(function), "addresses are for machine code"
     function(t, y, p, run_parameters, out)
 
 

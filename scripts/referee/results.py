@@ -138,7 +138,8 @@ def compared(case: str, old: Result, new: Result) -> Comparison:
     faults += [f"{name}: new" for name in sorted(new.values.keys() - old.values.keys())]
     for name in old.texts.keys() | texts.keys():
         before, after = old.texts.get(name), texts.get(name)
-        before = lib.RENAMED.get(before, before) if name == "method" else before
+        if name == "method" and before is not None:
+            before = lib.RENAMED.get(before, before)
         allowed = old.counts.get(name, [before])
         if not (before == after or (name in COUNTS and is_between(after, allowed))):
             faults.append(f"{name}: {after} for {before}")

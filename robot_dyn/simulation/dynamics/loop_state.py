@@ -15,7 +15,7 @@ from robot_dyn.integrate.primitives import below
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 _FIRST = np.zeros(1, np.int64)
-Function = Callable[..., object]  # in machine code its address
+Function = Callable[..., object] | int  # in machine code its address; 0 for none
 """A function of (t, y, p, run_parameters, out): a Python function, the address of machine code, or 0 for none."""
 
 

@@ -80,7 +80,7 @@ def parameters(what: Setup | Plant | Dynamics) -> Parameters:
     return Parameters(tuple(by_name.values())[::-1])
 
 
-def setup_parameter(parameter: Parameter, dynamics: Dynamics | None) -> SetupParameter:
+def setup_parameter(parameter: Parameter, dynamics: Dynamics) -> SetupParameter:
     """Return a parameter of `robot_dyn.codegen.parameters` with its unit."""
     types = joint_types_of(dynamics)
     of_joints, value = parameter.declared.of_joints, parameter.value

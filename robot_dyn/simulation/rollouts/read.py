@@ -41,4 +41,5 @@ def read(path: str | Path) -> Trajectory | Rollouts:
     if reader and read_start(path, len(RUN.start), RunFileError, REMEDY) != RUN.start:
         raise RunFileError(f"{path}: is not a run file (.npz); {reader}")
     run = run_format(Trajectory).load(path, rollouts_format(Rollouts))
+    assert isinstance(run, Trajectory | Rollouts)
     return replace(run, metadata=unpacked(run.metadata, path))

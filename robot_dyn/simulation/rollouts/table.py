@@ -67,8 +67,7 @@ def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
         () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.varied)
     )
     declared = {parameter.name: parameter.declared for parameter in varied if parameter.declared.of_joints}
-    dynamics = None if setup is None else setup.plant.dynamics
-    about = {parameter.name: setup_parameter(parameter, dynamics).unit for parameter in varied}
+    about = {} if setup is None else {x.name: setup_parameter(x, setup.plant.dynamics).unit for x in varied}
     for name, values in runs.varied.items():
         columns = values.T
         if name in declared and len(columns) == len(types):
