@@ -1,4 +1,4 @@
-"""A plant, a controller, a method and a duration → a trajectory that says how far it can be trusted."""
+"""A plant, a controller, a method and a duration → a trajectory with an estimate of its error."""
 
 from robot_dyn.foundations.public import public_names
 

@@ -10,7 +10,7 @@ from robot_dyn.cli.options import PRINTED, Results
 
 @command(LOOK)
 def diff_runs(a: str, b: str, /, tolerance: float = 1e-06, results: Results = PRINTED) -> None:
-    """Compare two runs: when they part, what differs.
+    """Compare two runs: the time at which they part, and the settings that differ.
 
     It prints the rms and the largest difference b − a by joint, and the settings that differ. The exit code is 0.
 

@@ -1,4 +1,4 @@
-"""Derivatives of smooth rates by differences at many steps, of which the most accurate is used.
+"""Derivatives of smooth rates by differences at many steps; the most accurate one is used.
 
 The change from one step to the next shows the truncation, and the slopes of both sides show a kink; the rounding of
 the rates is an argument. [Press et al., Numerical Recipes, 3rd ed., 2007, sec. 5.7]

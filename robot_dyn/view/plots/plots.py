@@ -114,7 +114,7 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
 
 
 def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
-    """One name or several."""
+    """Return one name or several as a tuple."""
     if isinstance(given, str):
         return (given,)
     if (names := () if given is None else several(given)) is None:
@@ -148,7 +148,7 @@ def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tupl
 
 
 def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None, width: float) -> View:
-    """Types of joints and limits by the URDF of the run; without one both units are named."""
+    """Return the view of a run, with joint types and limits from its URDF; without a URDF both units are named."""
     columns = _columns(run, shown)
     try:
         joints = structure_of(check(run.metadata.get("urdf", "").encode(), "the run's URDF"), Edits()).joints
@@ -167,5 +167,5 @@ def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None
 
 
 def _known(limits: np.ndarray) -> np.ndarray:
-    """Limits, inf where there is none: 0 and nan state none."""
+    """Return limits; inf for no limit, which 0, nan and 1e300 or more mean."""
     return np.where((limits > 0) & (limits < 1e300), limits, np.inf)
