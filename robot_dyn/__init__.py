@@ -6,7 +6,7 @@ Inspection          info (an arm), why (a torque by cause), explain (the equatio
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
 Display             replay, show, plot, diff_runs
-To keep             `.save(path)` of a run, a batch, a page, a figure or a result; read (a run, a batch)
+Files               `.save(path)` of a run, a batch, a page, a figure or a result; read (a run, a batch)
 Results             Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 
 Subpackages, whose docstrings list their contents: effects (friction, springs, stops, limits, …), control (controllers,

@@ -25,7 +25,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-GROUPS = "Look at a robot or a run", "Ask for its dynamics", "Run it", "Trust it", "Files"
+GROUPS = "Inspection", "Dynamics", "Simulation", "Verification", "Files"
 """Groups of commands, in the order of --help."""
 LOOK, ASK, RUN, TRUST, FILES = GROUPS
 _TOPICS = "demo", "query", "show", "diff_runs", "simulate", "cost", "export", "cache"

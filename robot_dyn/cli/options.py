@@ -1,6 +1,6 @@
 """Options of commands, described by their docstrings, and groups of options that commands share.
 
-    @command("Trust it")
+    @command("Verification")
     def certify(robot: Name, /, samples: int = 10_000, options: RobotOptions = AS_STATED, results: Results = PRINTED):
         # its docstring has a line "samples (COUNT): Number of random states."
 

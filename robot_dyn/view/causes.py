@@ -1,4 +1,4 @@
-"""The torque of each joint by cause, as the page shows it at a time: whole numbers of a step, at samples of a run."""
+"""The torque of each joint by cause for the page: integer multiples of a step, at samples of a run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _STEPS = 32767  # of 16 bits, for the largest torque of a joint
 
 
 def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
-    """The entry `causes` of the document of a run; None if it cannot be split."""
+    """Return the entry `causes` of the document of a run; None if its torques cannot be split."""
     try:
         split = causes_of(run)
     except RobotDynError:
@@ -35,7 +35,7 @@ def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
 
 
 def resolution(entry: dict[str, Any]) -> str:
-    """In words, how far the numbers of the page are from those of the run."""
+    """Return a note on the resolution of the torques by cause in time and value."""
     return (
         f"torque by cause is shown at {len(entry['t'])} samples, the latest one at each time, to"
         f" 1/{2 * _STEPS} of the largest of its joint"
@@ -43,7 +43,7 @@ def resolution(entry: dict[str, Any]) -> str:
 
 
 def _joint(name: str, kind: str | None, limit: float, parts: np.ndarray) -> dict[str, Any]:
-    """A joint with its torques (c + 1, k), of the causes and their sum."""
+    """Return the entry of a joint with its torques (c + 1, k), those of the causes and their sum."""
     step = float(np.abs(parts).max()) / _STEPS or 1.0
     extent = max(float(parts[:-1].clip(0.0).sum(axis=0).max()), float((-parts[:-1]).clip(0.0).sum(axis=0).max()))
     return {

@@ -95,7 +95,7 @@ class Canvas:
 
 
 def triangles(mesh: Mesh) -> Command:
-    """The geometry of a mesh; normals with 7 bits, which are enough for shading."""
+    """Return the geometry of a mesh; its normals have 7 bits, which are enough for shading."""
     index = mesh.faces.ravel().astype(np.uint16 if len(mesh.vertices) <= 2**16 else np.uint32)
     attributes = {
         "position": _attribute(mesh.vertices.astype(np.float32)),
@@ -109,7 +109,7 @@ def triangles(mesh: Mesh) -> Command:
 
 
 def as_message(command: Command) -> bytes:
-    """A command for meshcat's web socket."""
+    """Return a command as a message for meshcat's web socket."""
     import umsgpack
 
     def extension(array: np.ndarray) -> Any:
@@ -119,9 +119,9 @@ def as_message(command: Command) -> bytes:
 
 
 def as_text(document: Any) -> str:
-    """A document with arrays in it: length, JSON, arrays as `packed`; the page's script reads it.
+    """Return a document that contains arrays as text for the page's script: length, JSON and arrays, then `packed`.
 
-    Of each array the first bytes of all numbers come first, then the second ones and so on: this compresses better.
+    For better compression, an array is stored by bytes: the first bytes of all numbers, then the second ones …
     """
     arrays: dict[str, tuple[int, bytes]] = {}
     end = 0
@@ -142,7 +142,7 @@ def as_text(document: Any) -> str:
 
 
 def packed(content: bytes) -> str:
-    """Bytes, compressed: base64 of gzip, without a character that HTML would read."""
+    """Return compressed bytes as base64 of gzip, without characters that are special in HTML."""
     return base64.b64encode(gzip.compress(content, compresslevel=6, mtime=0)).decode()
 
 
@@ -161,7 +161,7 @@ def _array_type(array: np.ndarray) -> str:
 
 
 def _name(*contents: str | bytes) -> str:
-    """A name that is equal for equal contents, so that equal runs give equal pages."""
+    """Return a name that is equal for equal contents, so that equal runs give equal pages."""
     digest = hashlib.sha256()
     for content in contents:
         digest.update(content.encode() if isinstance(content, str) else content)

@@ -49,11 +49,11 @@ class Shown:
     """A run on its stage.
 
     Attributes:
-        name: In titles and notes.
-        prefix: Before its notes where there are several runs.
-        run: The part of it that can be drawn.
-        stage: Where its robot stands.
-        motion: With what lies between its samples.
+        name: Name in titles and notes.
+        prefix: Text before its notes if there are several runs; otherwise empty.
+        run: The part of the run that can be drawn.
+        stage: Stage of its robot.
+        motion: Its samples, and points between them.
         keys: Keyframes of its joints.
         drawing: The look of its robot.
         hidden: Samples after this part.
@@ -185,7 +185,7 @@ class _Document:
         stage.draw(self.canvas, look, keys, self._shows_boxes)
 
     def entries(self, **entries: Any) -> dict[str, Any]:
-        """The document, with these entries."""
+        """Return the document with these entries."""
         floor = f"the squares on the floor are {self.scenery.square:g} m wide"
         return entries | {
             "layers": {"inertia": self._shows_boxes, "paths": self.paths},
@@ -201,7 +201,7 @@ def _outcome(shown: Shown) -> str:
 
 
 def _title(shown: list[Shown]) -> str:
-    """The robot of one run; names of several, with how they are drawn."""
+    """Return the title: the robot of one run; for several runs, their names and how they are drawn."""
     first, *others = (item.name for item in shown)
     robots = list(dict.fromkeys(item.stage.robot.name for item in shown))
     prefix = f"{robots[0]}: " if len(robots) == 1 else ""
@@ -224,7 +224,7 @@ def _shown(
 
 
 def _drawable(run: TrajectoryData) -> TrajectoryData:
-    """The run up to its first sample that cannot be drawn."""
+    """Return the run up to its first sample that cannot be drawn; raise a ReplayError if no sample can."""
     u = np.isfinite(run.u) | np.isnan(run.u).all()  # rollouts may not have recorded it
     good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & u, axis=1)
     end = len(good) if good.all() else int(good.argmin())
@@ -243,7 +243,7 @@ def _corners(shown: Shown, inertia: bool) -> np.ndarray:
 
 
 def _labels(shown: list[Shown]) -> str:
-    """Gravity of the first run, and of others where it differs."""
+    """Return the gravity of the first run, and that of other runs where it differs."""
     first = shown[0].stage.robot
     others = [
         f"{item.name}: {item.stage.robot.edits.gravity} m/s²"

@@ -17,7 +17,7 @@ from robot_dyn.control.reference import hermite, polynomial
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 5e-4  # [rad] or [m]; half a millimetre at a reach of one metre, below a pixel of the screen
-CHORD = TOLERANCE / 10  # what lines between the times of a `Motion` may be off
+CHORD = TOLERANCE / 10  # largest error of lines between the times of a `Motion`
 _LARGEST_TURN = pi / 2  # between keyframes; from π on a viewer would take the shorter way round
 _MOST_PARTS = 64  # of the time between two samples
 _LOOKS = (0.25, 0.5, 0.75)  # parts of that time at which the polynomial is compared with others
@@ -25,13 +25,13 @@ _CHUNK = 20_000  # samples that are joined at a time
 
 
 class Motion(NamedTuple):
-    """A run and what lies between its samples.
+    """The samples of a run and points between them.
 
     Attributes:
         t: Times, (k,), in [s].
         q: Positions, (k, n).
-        open: How far the polynomials of q and v are from those of q, v and a, for each joint, (n,): where samples are
-            too far apart to tell what lies between.
+        open: Largest difference of the polynomials of q and v from those of q, v and a, for each joint, (n,). It is
+            large if samples are too far apart to determine the motion between them.
     """
 
     t: np.ndarray
@@ -58,7 +58,7 @@ class Keyframes:
 
 
 def motion_of(run: TrajectoryData) -> Motion:
-    """The samples of a run, and as many times between them as straight lines need."""
+    """Return the samples of a run, and the points between them that straight lines need."""
     data = [run.q, run.v] + ([run.a] if np.isfinite(run.a).all() else [])
     columns = np.stack(data, axis=1)
     times, points, left = [], [], [np.zeros(run.q.shape[1])]
@@ -71,7 +71,7 @@ def motion_of(run: TrajectoryData) -> Motion:
 
 
 def _between(t: np.ndarray, h: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times and positions from samples at t up to the next ones after h, from derivatives at both ends, (k, 2m, n)."""
+    """Return times and positions between samples at t and t + h, from derivatives at both ends, (k, 2m, n)."""
     m = ends.shape[1] // 2
     c, q0, q1 = hermite(h, ends), ends[:, 0], ends[:, m]
     lower = hermite(h, ends[:, [0, 1, 3, 4]]) if m == 3 else np.stack([q0, (q1 - q0) / h[:, None]], axis=1)
@@ -88,7 +88,7 @@ def _between(t: np.ndarray, h: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray
 
 
 def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Keyframes:
-    """Keyframes of samples t (m,), q (m, N)."""
+    """Return keyframes of samples t (m,), q (m, N)."""
     index = np.flatnonzero(corners(t, q, tolerance))
     times, positions = _short_turns(t[index], q[index])
     drawn = times.astype(np.float32).astype(float)
@@ -113,7 +113,7 @@ def stated_error(run: TrajectoryData, motion: Motion, keys: Keyframes, units: Ma
 
 
 def corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:
-    """Which samples are keyframes, (m,): split each span at its sample farthest from the chord until all are near."""
+    """Return True for keyframes, (m,): split each span at its sample farthest from the chord until all are near."""
     chosen = np.zeros(len(t), dtype=bool)
     chosen[[0, -1]] = True
     spans = [(0, len(t) - 1)]

@@ -30,11 +30,11 @@ def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame
     """Draw the centre of mass and the paths of a frame and of other links that move, those next to the tip first.
 
     Args:
-        canvas: Where to.
-        stage: Where the robot stands.
-        motion: Its samples and what lies between them.
+        canvas: Canvas to draw on.
+        stage: Stage of the robot.
+        motion: Its samples, and points between them.
         reach: Radius of the scene, in [m].
-        frame: Link whose path is shown at first.
+        frame: Link whose path the page shows when it opens.
 
     Returns:
         The links whose paths are drawn, the one to be shown first; and a note.
@@ -90,7 +90,7 @@ def draw_arrows(canvas: Canvas, runs: list[tuple[Stage, TrajectoryData]], reach:
 def _arrow(
     stage: Stage, run: TrajectoryData, reach: float, link: str, t: np.ndarray, F: np.ndarray
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """The tracks of an arrow on a link: F (k, 3) at times t (k,), in parts of the largest."""
+    """Return the tracks of an arrow on a link: F (k, 3) at times t (k,), as fractions of the largest."""
     q = np.stack([np.interp(t, run.t, column) for column in run.q.T], axis=1)
     points = stage.positions(q, [link])[:, 0]
     keys = corners(t, np.hstack([points / reach, F]), _PART)
@@ -101,7 +101,7 @@ def _arrow(
 
 
 def _along(vectors: np.ndarray) -> np.ndarray:
-    """Quaternions (k, 4) that turn the z axis along vectors (k, 3); none where a vector is 0."""
+    """Return quaternions (k, 4) that turn the z axis along vectors (k, 3); the identity where a vector is 0."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     x, y, z = (vectors / np.where(length > 0, length, 1.0)).T
     turns = np.stack([-y, x, 0 * z, 1 + z], axis=1)  # (ẑ × d, 1 + ẑ · d), not yet of unit length

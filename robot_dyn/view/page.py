@@ -1,4 +1,4 @@
-"""A page as a value: in a cell of a notebook it shows itself, at a prompt its `repr` is an address for a browser."""
+"""A page as a value: a notebook displays it; at a prompt, its `repr` is an address for a browser."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Page:
 
     @cached_property
     def address(self) -> str:
-        """Address (file:) of a copy among the temporary files, which is written when this is first asked for.
+        """Address (file:) of a copy among the temporary files, which is written on first access.
 
         Raises:
             ReplayError: If it cannot be written.
@@ -133,13 +133,13 @@ class Page:
         return f"<{self._title}: {self.address}>"
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        """The page in a frame, its picture, and a line of text; the line has an address only in a terminal."""
+        """Return the page in a frame, its picture, and a line of text, with an address in a terminal only."""
         still = b64encode(picture(self.document)).decode()
         text = repr(self) if sys.stdout.isatty() else f"<{self._title}: .address is a page, .save(path) writes it>"
         return {"text/html": self._frame(still), "image/png": still, "text/plain": text}
 
     def _frame(self, still: str) -> str:
-        """A frame with the page; what removes frames and keeps their content shows the picture."""
+        """Return a frame with the page; viewers that remove frames but keep their content show the picture."""
         title = escape(self._title)
         return (
             f'<iframe title="{title}" sandbox="allow-scripts allow-downloads" width="100%" height="{_HEIGHT}"'

@@ -23,7 +23,7 @@ _LIGHT = np.array([0.4, -0.5, 0.77])
 
 
 def picture(document: Mapping[str, Any]) -> bytes:
-    """The scene of a document at t = 0, as a PNG file of 720 × 480 pixels."""
+    """Return the scene of a document at t = 0 as a PNG file of 720 × 480 pixels."""
     from PIL import Image, ImageDraw
 
     size = WIDTH * _FINE, HEIGHT * _FINE
@@ -45,7 +45,7 @@ Shape = tuple[float, list[float], tuple[int, ...]]  # depth, corners in pixels, 
 
 
 def _layers(document: Mapping[str, Any]) -> Iterator[Iterator[Shape]]:
-    """The shapes of each object that is seen."""
+    """Yield the shapes of each visible object."""
     tree, camera = _Tree(document["commands"]), _Camera(document["scene"])
     for command in document["commands"]:
         if command["type"] == "set_object" and tree.seen(command["path"]):
@@ -53,7 +53,7 @@ def _layers(document: Mapping[str, Any]) -> Iterator[Iterator[Shape]]:
 
 
 def _shapes(drawn: Command, placement: np.ndarray, camera: _Camera) -> Iterator[Shape]:
-    """The triangles or lines of an object that stand before the camera."""
+    """Return the triangles or lines of an object in front of the camera."""
     data, look = drawn["geometries"][0]["data"], drawn["materials"][0]
     points = np.reshape(data["attributes"]["position"]["array"], (-1, 3)) @ placement[:3, :3].T + placement[:3, 3]
     base = np.array([look["color"] >> 16, look["color"] >> 8 & 255, look["color"] & 255])
@@ -77,7 +77,7 @@ def _shapes(drawn: Command, placement: np.ndarray, camera: _Camera) -> Iterator[
 
 
 def _shade(corners: np.ndarray) -> np.ndarray:
-    """Brightness (m,) of triangles (m, 3, 3); both sides are lit."""
+    """Return the brightness (m,) of triangles (m, 3, 3); both sides are lit."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     return 0.45 + 0.55 * np.abs(normals @ _LIGHT) / np.where(length > 0, length, 1.0)
@@ -85,7 +85,7 @@ def _shade(corners: np.ndarray) -> np.ndarray:
 
 @final
 class _Tree:
-    """Nodes by path: where they stand and whether they are seen, at the first keyframe."""
+    """Nodes by path: their placement and visibility at the first keyframe."""
 
     def __init__(self, commands: list[Command]) -> None:
         self._local: dict[str, np.ndarray] = {}
@@ -115,12 +115,12 @@ class _Tree:
         return self._hidden.isdisjoint(_above(path))
 
     def placement(self, path: str) -> np.ndarray:
-        """Placement (4, 4) of a node in the scene."""
+        """Return the placement (4, 4) of a node in the scene."""
         return reduce(np.matmul, (self._local.get(part, np.eye(4)) for part in _above(path)))
 
 
 def _above(path: str) -> list[str]:
-    """The paths of the nodes from the root to this one."""
+    """Return the paths of the nodes from the root to this one."""
     parts = path.split("/")
     return ["/".join(parts[: k + 1]) for k in range(len(parts))]
 
@@ -142,7 +142,7 @@ class _Camera:
         self.near = scene["radius"] / 100
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Depth (k,), in [m], and pixels (k, 2) of points (k, 3)."""
+        """Return depth (k,), in [m], and pixels (k, 2) of points (k, 3)."""
         x, y, depth = self._axes @ (points - self._eye).T
         scale = _FINE * HEIGHT / 2 / _HALF / np.where(depth > 0, depth, np.inf)
         return depth, np.column_stack([_FINE * WIDTH / 2 + scale * x, _FINE * HEIGHT / 2 - scale * y])

@@ -68,7 +68,7 @@ def show(
 
 
 def _page(document: dict[str, Any]) -> Page:
-    """The page of a document; warns once if anything is drawn differently from what the files describe."""
+    """Return the page of a document; warn once if a part is not drawn as the files describe it."""
     if problems := document["problems"]:
         rest = f"; and {len(problems) - 1} more, listed on the page" if len(problems) > 1 else ""
         warnings.warn(f"drawn otherwise than its files describe: {problems[0]}{rest}", ModelWarning, stacklevel=3)

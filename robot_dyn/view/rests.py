@@ -20,8 +20,8 @@ class Rest(NamedTuple):
     """A time in which a joint is held.
 
     Attributes:
-        start, end: In [s].
-        at_stop: Whether it rests at a stop.
+        start, end: Start and end, in [s].
+        at_stop: True if it rests at a stop.
     """
 
     start: float
@@ -45,7 +45,7 @@ def rests(run: TrajectoryData) -> tuple[tuple[Rest, ...], ...]:
 
 
 def lanes(run: TrajectoryData, prefix: str, most_events: int) -> Iterator[dict[str, Any]]:
-    """The entries `rests` of a page's document: of each joint that is held for a time, its rests and its events."""
+    """Yield the entries `rests` of a page's document: rests and events of each joint that is held for a time."""
     for name, spans in zip(run.joint_names, rests(run), strict=True):
         if spans:
             events = [(event.t, event.name) for event in run.events if event.joint == name]

@@ -60,7 +60,7 @@ class Scenery:
         return self.center + away * left + [0.0, 0.0, _ARROW * self.radius]
 
     def as_json(self) -> dict[str, Any]:
-        """Data for the camera of the page; the arrow of gravity is in view."""
+        """Return data for the camera of the page; the arrow of gravity is in view."""
         seen = np.vstack([self.outline, self.aside, self.aside - [0.0, 0.0, _ARROW * self.radius]])
         places = {"center": self.center, "camera": self.camera, "outline": seen}
         return {"radius": self.radius} | {name: place.tolist() for name, place in places.items()}
@@ -82,7 +82,7 @@ def scenery(points: np.ndarray) -> Scenery:
 
 
 def upright(gravity: tuple[float, float, float]) -> np.ndarray:
-    """The least rotation (3, 3) that turns gravity down, to −z; the identity without gravity."""
+    """Return the smallest rotation (3, 3) that turns gravity to −z; the identity without gravity."""
     from scipy.spatial.transform import Rotation
 
     size = float(np.linalg.norm(gravity))
@@ -105,7 +105,7 @@ def surround(canvas: Canvas, seen: Scenery, gravity: tuple[float, float, float])
 
 
 def gravity_label(robot: Robot) -> str:
-    """The label of gravity in the picture."""
+    """Return the label of gravity in the picture."""
     gravity = robot.edits.gravity
     if not any(gravity):
         return "no gravity"
@@ -114,7 +114,7 @@ def gravity_label(robot: Robot) -> str:
 
 
 def turned(gravity: tuple[float, float, float]) -> list[str]:
-    """A note on the orientation of the scene, unless gravity acts along −z of the base."""
+    """Return a note on the orientation of the scene, unless gravity acts along −z of the base."""
     if not any(gravity):
         return ["gravity is zero; up is z of the base"]
     if np.array_equal(upright(gravity), np.eye(3)):

@@ -99,7 +99,7 @@ def _by_joint(run: TrajectoryData, x: np.ndarray) -> Columns:
 
 
 def _desired(run: TrajectoryData, first: TrajectoryData, field: str) -> Columns:
-    """Desired values of a run; none where they are those of the first."""
+    """Return the desired values of a run; none if they equal those of the first run."""
     x, of_first = getattr(run, field), getattr(first, field)
     again = run is not first and of_first is not None and np.array_equal(x, of_first)
     return {} if x is None or again else _by_joint(run, x)
@@ -124,7 +124,7 @@ def _energy(run: TrajectoryData) -> Columns:
 
 
 def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
-    """Positions of a run less those of the first, and when they part."""
+    """Return the positions of a run minus those of the first, and the time at which they part."""
     found = difference(a, b)
     if found.parted_s is not None:
         at = f": they part at t = {found.parted_s:.4g} s"
@@ -137,7 +137,7 @@ def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q
 
 
 def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
-    """A plot of curves, at the times that thinning keeps of any; nan where a run has ended."""
+    """Return a plot of curves at the times that thinning keeps for at least one of them; nan after the end of a run."""
     curves = [curve for curve in curves if len(curve.t)]
     t = np.unique(np.concatenate([np.zeros(0), *(curve.t[thinned(curve.values[:, None])] for curve in curves)]))
     colors = {name: index for index, name in enumerate(dict.fromkeys(curve.name for curve in curves))}
@@ -159,7 +159,7 @@ def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
 
 
 def _limits(names: Sequence[str], lower: np.ndarray, upper: np.ndarray, curves: list[Curve]) -> dict[str, Any]:
-    """Limits that are drawn, since they are near the curve of their joint, and in words the others.
+    """Return the limits to draw, which are near the curve of their joint, and the others in words.
 
     Near is within 1.5 times the largest value of its joint, or within a tenth of the height of all curves; and within
     half this height, so that no limit makes the curves much flatter.
@@ -186,7 +186,7 @@ def _finite(curves: list[Curve]) -> np.ndarray:
 
 
 def _in_words(beyond: dict[float, list[str]]) -> str:
-    """Joints and their limits, lower … upper, or ± where these differ by their sign alone."""
+    """Return joints and their limits in words, lower … upper, or ± if they differ in sign only."""
     of: dict[tuple[str, ...], list[float]] = {}
     for value, names in beyond.items():
         of.setdefault(tuple(names), []).append(value)
@@ -202,7 +202,7 @@ def _of(names: list[str]) -> str:
 
 
 def thinned(columns: np.ndarray, buckets: int = _BUCKETS) -> np.ndarray:
-    """Indices of samples (m, c) that keep the least and the largest of each column in each bucket, and both ends."""
+    """Return indices of samples (m, c): the smallest and largest of each column in each bucket, and both ends."""
     m = len(columns)
     if m <= 4 * buckets:
         return np.arange(m)

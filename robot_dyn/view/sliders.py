@@ -19,7 +19,7 @@ _TURN, _SLIDE = pi, 1.0  # [rad], [m]; how far a joint without limits can be mov
 
 
 def sliders(stage: Stage, q: np.ndarray) -> dict[str, Any]:
-    """The entry `sliders` of the document of a robot that is shown at q (n,)."""
+    """Return the entry `sliders` of the document of a robot that is shown at q (n,)."""
     robot, linkage = stage.robot, stage.linkage
     of_joints = zip(robot.joint_names, robot.joint_types, q, robot.lower, robot.upper, robot.effort_limit, strict=True)
     of_bodies = zip(linkage.bodies, linkage.inertias, stage.paths, strict=True)

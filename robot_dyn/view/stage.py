@@ -43,7 +43,7 @@ class Stage:
     opacity: float = 1.0
 
     def tint(self, rgba: Rgba) -> Rgba:
-        """A colour with the opacity of this stage."""
+        """Return a colour with the opacity of this stage."""
         return (*rgba[:3], rgba[3] * self.opacity)
 
     @cached_property
@@ -61,7 +61,7 @@ class Stage:
         return tuple(paths)
 
     def link_path(self, link: str) -> str:
-        """Path of a link's node; QueryError if there is no such link."""
+        """Return the path of a link's node; raise a QueryError for an unknown link."""
         if link not in self.linkage.links:
             raise QueryError(f"no link {link!r}; {nearest(link, self.linkage.links)}")
         body, _, _ = self.linkage.links[link]
@@ -84,7 +84,7 @@ class Stage:
             canvas.move(path, **_tracks(body, keys.t, keys.q[:, index]))
 
     def positions(self, q: np.ndarray, links: Sequence[str]) -> np.ndarray:
-        """Origins of links in the base at positions q (m, n), shape (m, k, 3)."""
+        """Return origins of links in the base at positions q (m, n), shape (m, k, 3)."""
         poses = [self.linkage.links[link][:2] for link in links]
 
         def origins(at: Placements, m: int) -> np.ndarray:
@@ -93,7 +93,7 @@ class Stage:
         return self._over(q, origins)
 
     def centre_of_mass(self, q: np.ndarray) -> np.ndarray:
-        """Centre of mass of the bodies that move, in the base, (m, 3): Σ mᵢ pᵢ / Σ mᵢ."""
+        """Return the centre of mass of the bodies that move, in the base, (m, 3): Σ mᵢ pᵢ / Σ mᵢ."""
 
         def middle(at: Placements, m: int) -> np.ndarray:
             total, mass = np.zeros((m, 3)), 0.0
@@ -108,7 +108,7 @@ class Stage:
         return np.concatenate([function(self.linkage.at(chunk).in_base, len(chunk)) for chunk in chunks])
 
     def corners(self, pieces: tuple[Piece, ...], q: np.ndarray) -> np.ndarray:
-        """Corners of the boxes about all pieces at positions q (k, n), and the base and the tip, (m, 3)."""
+        """Return corners of the boxes about all pieces at positions q (k, n), the base and the tip, (m, 3)."""
         at, points = self.linkage.at(q).in_base, [np.zeros((1, 3))]
         for piece in pieces:
             R, p = placement(at, *self.linkage.links[piece.link][:2])
@@ -130,7 +130,7 @@ class Stage:
 
 
 def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Placement g exp(ξ̂ q) of a joint's node at keyframes."""
+    """Return the placement g exp(ξ̂ q) of a joint's node at keyframes."""
     from scipy.spatial.transform import Rotation
 
     zero = Rotation.from_matrix(body.pose.R)
@@ -142,7 +142,7 @@ def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> dict[str, tuple[np.ndar
 
 
 def placement(at: Placements, body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    """(R, p) in the base of a pose in a body, from those of all bodies."""
+    """Return (R, p) in the base of a pose in a body, from the placements of all bodies."""
     if body == BASE:
         return pose.R, pose.p
     R, p = at[body]
@@ -150,5 +150,5 @@ def placement(at: Placements, body: int, pose: Pose) -> tuple[np.ndarray, np.nda
 
 
 def plain(name: str) -> str:
-    """A name as one part of a path, which the viewer cuts at slashes."""
+    """Return a name as one part of a path; the viewer splits paths at slashes."""
     return name.replace("/", "∕")

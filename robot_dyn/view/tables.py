@@ -51,7 +51,7 @@ def _rows(run: TrajectoryData) -> Iterator[tuple[str, str]]:
 
 
 def _accuracy(run: TrajectoryData) -> Iterator[tuple[str, str]]:
-    """Requested accuracy, and the cost of one digit more or fewer; time is assumed proportional to evaluations."""
+    """Yield the requested accuracy and the cost of one digit more or fewer; assume time proportional to evaluations."""
     of = run.accuracy
     assert of is not None
     at = f", at rtol {of.rtol:.1e}" if of.rtol else ""

@@ -335,7 +335,7 @@ def sweep(setup: str, vary: Mapping[str, Any], figures: Mapping[str, Any], desig
 def sweep_values(of: Any, folder: Path) -> tuple[Values, Texts]:
     """Run a sweep on one thread; return the numbers and the texts of its rows that are compared."""
     table = _sw.run(of, folder, threads=1, chunk=32).table()
-    names = {theirs: ours for ours, theirs in PARAMETERS.items()}
+    names = {theirs: ours for ours, theirs in PARAMETERS.items()} | {"ended_s": "ended"}
     values = {
         ours_of(name, names): x
         for name, x in table.items()

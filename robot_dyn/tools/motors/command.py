@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _RUNS = ".toml", ".npz"
 
 
-@command("Ask for its dynamics")
+@command("Dynamics")
 def budget(
     what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     plan: str | None = None,

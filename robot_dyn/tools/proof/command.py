@@ -8,7 +8,7 @@ import robot_dyn as rd
 from robot_dyn.cli import Json, Scene, bar, command, show
 
 
-@command("Trust it")
+@command("Verification")
 def prove(
     scene: Scene,
     /,

@@ -12,7 +12,7 @@ from robot_dyn.cli import AS_STATED, Force, Json, Name, RobotOptions, bar, comma
 from robot_dyn.foundations import target
 
 
-@command("Trust it")
+@command("Verification")
 def stress(
     robot: Name,
     /,

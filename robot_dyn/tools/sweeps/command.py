@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 ACTIONS = ("run", "status", "verify", "report", "export")
 
 
-@command("Run it")
+@command("Simulation")
 def sweep(
     what: str,
     folder: str | None = None,

@@ -20,7 +20,7 @@ CELLS = 32  # of the longest side of a mesh
 
 
 def coarse(mesh: Mesh) -> Mesh:
-    """The mesh with the corners in each cubic cell at their mean, without the triangles that collapse.
+    """Return the mesh with the corners in each cubic cell at their mean, without the triangles that collapse.
 
     No corner moves by more than the diagonal of a cell, √3 / `CELLS` of the longest side.
     """
@@ -34,14 +34,14 @@ def coarse(mesh: Mesh) -> Mesh:
 
 
 def look_of(robot: Robot, package_dirs: Iterable[str | Path], inertia: bool, meshes: str) -> Drawing:
-    """Return what draws a robot, with the meshes of its files or coarse ones."""
+    """Return the drawing of a robot, with the meshes of its files or coarse ones."""
     choice("meshes", meshes, ("full", "coarse"))
     look = drawing(robot, package_dirs, inertia=inertia)
     return look if meshes == "full" else _coarsened(look)
 
 
 def _coarsened(look: Drawing) -> Drawing:
-    """A drawing with its meshes coarse; pieces that share one still do."""
+    """Return a drawing with coarse meshes; pieces that share a mesh still share it."""
     meshes = {id(piece.mesh): piece.mesh for piece in look.pieces}
     known = {key: coarse(mesh) for key, mesh in meshes.items()}
     before, after = (sum(len(values.faces) for values in some.values()) for some in (meshes, known))

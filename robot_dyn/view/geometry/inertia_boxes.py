@@ -1,4 +1,4 @@
-"""Inertia made visible: the box, or the ellipsoid, that moves as a body does.
+"""The uniform box, or ellipsoid, with the mass and inertia of a body.
 
     l_x² = 6 (I_y + I_z − I_x) / m        the uniform box of mass m with principal moments I
 
@@ -22,14 +22,14 @@ from robot_dyn.view.geometry.shapes import box, ellipsoid
 
 _THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with
 _SMALL = 0.01  # [m], edge drawn for a mass in one point
-_POINT, _LARGEST = 1e-6, 1e6  # [m]: an edge below is that of a point; none is drawn longer than the other
+_POINT, _LARGEST = 1e-6, 1e6  # [m]: shorter edges belong to a point mass; the largest length of an edge
 
 
 def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None]]:
-    """For each body that moves and has mass: its link, pose there (4, 4), uniform box, and why it is doubtful.
+    """Yield link, pose in the link (4, 4), uniform box and doubt of each body that moves and has mass.
 
-    The bodies are those of the dynamics: with payloads, and with all links fixed to them. Moments that no body has
-    would need an edge of negative square; that edge is drawn thin. A box far beyond the robot is drawn as long as the
+    The bodies are those of the dynamics: with payloads, and with all links fixed to them. Moments that no body can
+    have would need an edge of negative square, drawn thin. A box far beyond the robot is drawn as long as the
     robot's longest link.
     """
     stated = structure_of(robot.description, robot.edits)
@@ -50,19 +50,19 @@ def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None
 
 
 def off_centre(mesh: Mesh, pose: ndarray, com: ndarray) -> float:
-    """Distance in [m] of the middle of a mesh, placed by a pose (4, 4), from a centre of mass."""
+    """Return the distance in [m] of the middle of a mesh, placed by a pose (4, 4), from a centre of mass."""
     middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return float(np.linalg.norm(pose[:3, :3] @ middle + pose[:3, 3] - com))
 
 
 def inertia_ellipsoid(mass: float, inertia: ndarray) -> tuple[Mesh, ndarray]:
-    """The uniform ellipsoid of a mass and an inertia about its centre, a² = 5 (I_y + I_z − I_x) / (2 m); its axes."""
+    """Return the uniform ellipsoid of a mass and a central inertia, a² = 5 (I_y + I_z − I_x) / (2 m), and its axes."""
     lengths, axes = _lengths(mass, inertia, 2.5)
     return ellipsoid(*np.maximum(lengths, 0.02 * lengths.max())), axes
 
 
 def _lengths(mass: float, inertia: ndarray, factor: float) -> tuple[ndarray, ndarray]:
-    """√(factor (I_y + I_z − I_x) / m) along the principal axes, and these axes as the columns of a rotation."""
+    """Return √(factor (I_y + I_z − I_x) / m) along the principal axes, and these axes as the columns of a rotation."""
     moments, axes = np.linalg.eigh(inertia)
     axes = axes * np.sign(np.linalg.det(axes))
     with np.errstate(over="ignore"):  # of a mass of 1e-320 kg

@@ -1,4 +1,4 @@
-"""Shapes made of numbers: box, cylinder, ellipsoid, arrow; curved ones turn a profile (r, z) about the z axis."""
+"""Shapes computed from numbers: box, cylinder, ellipsoid, arrow; curved ones turn a profile (r, z) about the z axis."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SEGMENTS = 48  # of a circle
 
 
 def box(x: float, y: float, z: float) -> Mesh:
-    """Box with edges x, y, z in [m] about the origin."""
+    """Return a box with edges x, y, z in [m] about the origin."""
     corners, uv = [], []
     for axis in range(3):
         for sign in (-1.0, 1.0):
@@ -27,25 +27,25 @@ def box(x: float, y: float, z: float) -> Mesh:
 
 
 def cylinder(radius: float, length: float) -> Mesh:
-    """Cylinder about the z axis, its middle at the origin, in [m]."""
+    """Return a cylinder about the z axis with its middle at the origin, in [m]."""
     h = length / 2
     return _revolved([(0, -h), (radius, -h), (radius, h), (0, h)])
 
 
 def ellipsoid(a: float, b: float, c: float) -> Mesh:
-    """Ellipsoid with semi-axes a, b, c along x, y, z in [m]."""
+    """Return an ellipsoid with semi-axes a, b, c along x, y, z in [m]."""
     turn = np.linspace(-pi / 2, pi / 2, _SEGMENTS // 2 + 1)
     return _revolved(np.column_stack([np.cos(turn), np.sin(turn)]), (a, b, c))
 
 
 def arrow(length: float) -> Mesh:
-    """Arrow from the origin along the z axis, in [m]."""
+    """Return an arrow from the origin along the z axis, its length in [m]."""
     shaft, head = 0.015 * length, 0.05 * length
     return _revolved([(0, 0), (shaft, 0), (shaft, 0.8 * length), (head, 0.8 * length), (0, length)])
 
 
 def _revolved(profile: Any, stretch: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
-    """The surface of a profile (r, z), upwards, turned about z; smooth up to `CREASE`."""
+    """Return the surface of an upward profile (r, z) turned about z; it is smooth up to `CREASE`."""
     r, z = np.asarray(profile, dtype=float).T
     r = np.where(r < 1e-12 * np.abs(r).max(), 0.0, r)
     turn = 2 * pi * np.arange(_SEGMENTS + 1) / _SEGMENTS
@@ -70,7 +70,7 @@ def _mesh(*columns: Any) -> Mesh:
 
 
 def sphere(radius: float) -> Mesh:
-    """Sphere about the origin, radius in [m]."""
+    """Return a sphere about the origin, its radius in [m]."""
     return ellipsoid(radius, radius, radius)
 
 

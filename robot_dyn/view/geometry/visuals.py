@@ -67,7 +67,7 @@ class Drawing:
     Attributes:
         pieces: Pieces of the drawing.
         notes: Visuals that could not be drawn as described.
-        remarks: What else a reader should know.
+        remarks: Other remarks for the reader.
         boxes: The uniform box with the mass and moments of each body that moves, payloads included.
     """
 
@@ -77,12 +77,12 @@ class Drawing:
     boxes: tuple[Piece, ...] = ()
 
     def seen(self, inertia: bool) -> tuple[Piece, ...]:
-        """The pieces that are shown at first."""
+        """Return the pieces that the page shows when it opens."""
         return self.pieces + self.boxes if inertia else self.pieces
 
 
 def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: bool = False) -> Drawing:
-    """The pieces of every visual of a robot, wherever its mesh files can be found.
+    """Return the pieces of every visual of a robot whose mesh files can be found.
 
     Args:
         robot: The robot; its edits do not change its look.
@@ -99,7 +99,7 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
         boxes.append(Piece(link, pose, mesh, _DOUBTFUL if doubt else _INERTIA))
         if doubt and inertia:
             artist.notes.append(f"inertia box of link {link!r}: {doubt}, in red; correct its <inertia>")
-    estimated = [f"{robot.name}: {each}" for each in estimated_links(robot.description)]
+    estimated = [f"{robot.name}: {text}" for text in estimated_links(robot.description)]
     return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), (*artist.remarks, *estimated), tuple(boxes))
 
 
@@ -107,7 +107,7 @@ def solids(
     robot: Robot, package_dirs: Iterable[str | Path] = (), kinds: tuple[str, ...] = ("collision", "visual"),
     links: Container[str] | None = None,
 ) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:  # fmt: skip
-    """The shapes of each link of the first kind of which one can be read; and what cannot.
+    """Return the shapes of each link, of the first kind with a readable shape; and notes on unreadable ones.
 
     Args:
         robot: The robot.
@@ -129,7 +129,7 @@ class _Artist:
         self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
         self.notes, self.remarks = list[str](), list[str]()
         self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs), remarks=self.remarks)
-        self._turned = frozenset({meshes.GLTF})  # the formats of which files with y up are turned to z up
+        self._turned = frozenset({meshes.GLTF})  # formats whose files with y up are turned to z up
         self._y_up: list[tuple[str, str, ndarray, Mesh]] = []  # of these files: format, link, pose and mesh
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
         self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag](*lengths))
@@ -150,32 +150,32 @@ class _Artist:
         return pieces
 
     def links(self) -> list[tuple[str, Any]]:
-        """The links of the robot by name; those that no joint connects to it are not of it."""
+        """Return the links of the robot by name, without links that no joint connects to it."""
         named = [((link.get("name") or "").strip(), link) for link in self.element.iterfind("link")]
         return [(name, link) for name, link in named if name in self.checked]
 
     def upright(self, draw: Callable[[], T]) -> T:
         """Return a drawing; draw again if files with y up, turned or not, stand nearer to masses the other way."""
         drawn = draw()
-        wrong = frozenset(each for each in _Y_UP_REMARKS if self._nearer_the_other_way(each))
+        wrong = frozenset(kind for kind in _Y_UP_REMARKS if self._nearer_the_other_way(kind))
         if not wrong:
             return drawn
         self._turned ^= wrong
-        self.remarks += [f"{self.name}: {_Y_UP_REMARKS[each]}" for each in sorted(wrong)]
+        self.remarks += [f"{self.name}: {_Y_UP_REMARKS[kind]}" for kind in sorted(wrong)]
         return draw()
 
     def _nearer_the_other_way(self, kind: str) -> bool:
         R = meshes.Z_UP.T if kind in self._turned else meshes.Z_UP
         turn, here, there = homogeneous(R, np.zeros(3)), 0.0, 0.0
-        for each, name, pose, mesh in self._y_up:
-            for origin in self.checked[name].iterfind("inertial/origin") if each == kind else ():
+        for file_format, name, pose, mesh in self._y_up:
+            for origin in self.checked[name].iterfind("inertial/origin") if file_format == kind else ():
                 com = np.array(origin.get("xyz").split(), dtype=float)  # checked by the hardened read
                 here += off_centre(mesh, pose, com)
                 there += off_centre(mesh, pose @ turn, com)
         return there < 0.6 * here
 
     def link_solids(self, kinds: tuple[str, ...], links: Container[str] | None) -> dict[str, tuple[Piece, ...]]:
-        """The shapes of links of the first kind of which one can be read."""
+        """Return the shapes of links, of the first kind with a readable shape."""
         found: dict[str, tuple[Piece, ...]] = {}
         for name, link in self.links():
             for kind in kinds if links is None or name in links else ():
@@ -186,7 +186,7 @@ class _Artist:
         return found
 
     def visuals(self, name: str, link: Any) -> list[Piece]:
-        """The pieces of the visuals of a link, and a stand-in for those that cannot be read."""
+        """Return the pieces of the visuals of a link, and a replacement for those that cannot be read."""
         pieces, failed = self.shapes(name, link, "visual")
         if failed:
             substitute, what = self.stand_in(name, link)
@@ -195,7 +195,7 @@ class _Artist:
         return pieces
 
     def stand_in(self, name: str, link: Any) -> tuple[list[Piece], str]:
-        """The readable collision shapes of a link, otherwise the ellipsoid of its inertia; and which of them."""
+        """Return the readable collision shapes of a link, otherwise the ellipsoid of its inertia; and its name."""
         pieces, failed = self.shapes(name, link, "collision", _STAND_IN)
         if link.find("visual") is None:  # otherwise the note on the visual stands for both
             self.notes += [f"link {name!r}: <collision>: {why}" for why in failed]
@@ -211,7 +211,7 @@ class _Artist:
         return [Piece(name, pose, mesh, _STAND_IN)], "the ellipsoid of its inertia is"
 
     def shapes(self, name: str, link: Any, kind: str, color: Rgba | None = None) -> tuple[list[Piece], list[str]]:
-        """The pieces of all shapes of a kind that can be read, and why the others cannot."""
+        """Return the pieces of all readable shapes of a kind, and the reasons why others cannot be read."""
         pieces, failed = [], []
         for element in link.iterfind(kind):
             try:
@@ -221,7 +221,7 @@ class _Artist:
         return pieces, failed
 
     def shape(self, name: str, element: Any, color: Rgba | None) -> list[Piece]:
-        """The pieces of a <visual> or <collision>."""
+        """Return the pieces of a <visual> or <collision>."""
         pose, (stated, texture) = self.pose(name, element), self.material(name, element)
         shape = elements.shape(element)
         if shape.tag == "mesh":
@@ -256,7 +256,7 @@ class _Artist:
             return np.eye(4)
 
     def material(self, name: str, element: Any) -> tuple[Rgba | None, bytes | None]:
-        """Colour and texture that a visual names, or None."""
+        """Return colour and texture that a visual names, or None."""
         material = element.find("material")
         if material is None:
             return None, None

@@ -77,7 +77,7 @@ class Bridge:
         self._web_url, self.scene = web_url, Scene()
         for command in commands:
             self.scene.keep(command, as_message(command))
-        self._pictures: dict[Browser, deque[asyncio.Future[bytes]]] = {}  # requested of each browser
+        self._pictures: dict[Browser, deque[asyncio.Future[bytes]]] = {}  # requested from each browser
         self._watched = asyncio.Event()
         self._context = zmq.asyncio.Context()
         self._socket = self._context.socket(zmq.ROUTER)
@@ -86,7 +86,7 @@ class Bridge:
         self.url = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
 
     async def serve(self) -> None:
-        """Answer requests, each in a task of its own, until cancelled."""
+        """Answer requests until cancelled, each in a separate task."""
         tasks: set[asyncio.Task[None]] = set()
         try:
             while True:
@@ -109,13 +109,13 @@ class Bridge:
         self._watched.set()
 
     def leave(self, browser: Browser) -> None:
-        """Forget a browser."""
+        """Remove a browser."""
         self._pictures.pop(browser, None)
         if not self._pictures:
             self._watched.clear()
 
     def answered(self, browser: Browser, message: str | bytes) -> None:
-        """Take a browser's message: the picture that was requested of it; anything else is ignored."""
+        """Handle a message of a browser: the picture that was requested from it; other messages are ignored."""
         try:
             picture = b64decode(json.loads(message)["data"].partition(",")[2], validate=True)
         except (ValueError, TypeError, LookupError, AttributeError, RecursionError):

@@ -59,7 +59,7 @@ class Browser(_Local, WebSocketHandler):
     """The web socket of a browser; a request for a page here is redirected to it."""
 
     def initialize(self, bridge: Bridge) -> None:
-        """Take the bridge that all browsers share."""
+        """Set the bridge that all browsers share."""
         self._bridge = bridge
 
     async def get(self, *args: Any, **kwargs: Any) -> None:

@@ -1,6 +1,6 @@
-"""The parts of figures of a batch: quantiles over time, how runs ended, a figure of each run, and it over a parameter.
+"""The parts of figures of a batch: quantiles over time, outcomes, a figure of the runs, and that over a parameter.
 
-Bands are of the runs that did not diverge; those that did are drawn by themselves and counted.
+Bands show the runs that did not diverge; the others are drawn separately and counted.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Bars(Axes):
     lost: int = 0
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
-        """Draw bars, with the count where they have names, and of what diverged."""
+        """Draw bars, with the counts of named bars and of diverged runs."""
         colours, paper = style.colours["lines"], style.colours["paper"]
         numbers = {"padding": 1, "fontsize": style.small - 0.5} | style.ink
         hues = [colours[LOST if name == Ending.DIVERGED.value else 0] for name in self.names] or colours[0]
@@ -79,7 +79,7 @@ class Bars(Axes):
 
 
 def fan(view: BatchView) -> list[Panel]:
-    """Quantiles of q of each joint over time.
+    """Return quantiles of q of each joint over time.
 
     Raises:
         PlotError: If q was not recorded.
@@ -92,7 +92,7 @@ def fan(view: BatchView) -> list[Panel]:
 
 
 def tracking(view: BatchView) -> list[Panel]:
-    """Quantiles of the tracking error of each joint, or of the frame along each axis, over time.
+    """Return quantiles of the tracking error of each joint, or of the frame along each axis, over time.
 
     Raises:
         PlotError: If q was not recorded, or the runs have no reference, or come from a file.
@@ -157,7 +157,7 @@ BATCH_PLOTS: Mapping[str, Callable[[BatchView], list[Panel]]] = MappingProxyType
 
 
 def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.ndarray) -> Panel:
-    """A fan of each column of values (B, m, c)."""
+    """Return a panel with the quantiles of each column of values (B, m, c)."""
     t, gone = view.runs.t, view.runs.diverged
     cells = []
     for k, (name, y) in enumerate(names):
@@ -183,10 +183,10 @@ def _title(view: BatchView, some: np.ndarray) -> str:
 
 
 def _column(runs: RolloutsData, option: str, name: str | None, preferred: tuple[str, ...]) -> tuple[str, np.ndarray]:
-    """Heading and numbers of a column of the table of runs, named with or without its unit.
+    """Return heading and numbers of a column of the table of runs, named with or without its unit.
 
     Raises:
-        QueryError: If there is none of that name, or it holds no numbers.
+        QueryError: If no column has that name, or it does not contain numbers.
     """
     table = {heading: x for heading, x in runs.table().items() if _numeric(x)}
     if name is None:

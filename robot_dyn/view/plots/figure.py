@@ -167,7 +167,7 @@ class Cell(Axes):
 
     @staticmethod
     def _draw(curve: Curve, axes: Any, style: Style, log: bool) -> None:
-        """A line, or dots where it has none; a point alone is a dot."""
+        """Draw a curve as a line, or as dots; a single point is a dot."""
         x, y = (np.where(np.abs(z) < _LARGEST, z, np.nan) for z in (curve.x, curve.y))
         y = np.where(y > 0, y, np.nan) if log else y
         if curve.dots or np.isfinite(y).sum() == 1:
@@ -183,7 +183,7 @@ class Cell(Axes):
 
 
 def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
-    """Axes in the colours of a theme, with a grid below and ticks of that size."""
+    """Set the colours of axes from a theme, draw a grid below the curves, and set the size of tick labels."""
     axes.set_facecolor(theme["paper"])
     axes.grid(color=theme["grid"], linewidth=0.5)
     axes.set_axisbelow(True)
@@ -248,7 +248,7 @@ def scale(
 
 
 def _tick(x: float, is_small: bool) -> str:
-    """A number at an axis: 5e−4 where numbers are small, otherwise up to five digits."""
+    """Return a number at an axis: as 5e−4 where numbers are small, otherwise with up to five digits."""
     scientific = x and (is_small or not 1e-4 <= abs(x) < 1e5)
     if not scientific:
         return f"{x:.5g}".replace("-", "−")
@@ -274,5 +274,5 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def shortened(name: str, most: int) -> str:
-    """A name cut in its middle: those of one robot differ at their ends."""
+    """Return a name cut in its middle, because names of one robot differ at their ends."""
     return name if len(name) <= most else f"{name[: most // 2]}…{name[len(name) - (most - 1) // 2 :]}"

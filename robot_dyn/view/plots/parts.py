@@ -54,12 +54,12 @@ class View:
         return int(self.width / _CELL_MM)
 
     def unit(self, quantity: str, i: int) -> str:
-        """Unit of a quantity of a joint; both units where its type is not known."""
+        """Return the unit of a quantity of a joint; both units if its type is unknown."""
         return unit(quantity, self.types[i])
 
 
 def overview(view: View) -> list[Panel]:
-    """A row for each joint with q, u, tracking error and v, those that are known and fit; energy and errors below."""
+    """Return a row for each joint: q, u, tracking error and v, if known and if they fit; energy and errors below."""
     run, held = view.run, rests(view.run)
     known = {"q": _position}
     known |= {"u": _torque} if np.nan_to_num(run.u).any() else {}
@@ -86,7 +86,7 @@ def overview(view: View) -> list[Panel]:
 
 
 def joints(view: View) -> list[Panel]:
-    """Position and velocity of each joint, with the desired position where there is a reference, and its rests."""
+    """Return position and velocity of each joint, with the desired position if there is a reference, and its rests."""
     held = rests(view.run)
     q = in_rows([_position(view, i, held[i]) for i in view.joints], view.columns)
     v = in_rows([replace(_velocity(view, i, held[i]), title="") for i in view.joints], view.columns)
@@ -95,7 +95,7 @@ def joints(view: View) -> list[Panel]:
 
 
 def torques(view: View) -> list[Panel]:
-    """Actuation of each joint against ± its effort limit, with the part of it that was used, between samples too.
+    """Return the actuation of each joint with ± its effort limit, and the fraction used, also between samples.
 
     Raises:
         PlotError: If it was not recorded.
@@ -107,7 +107,7 @@ def torques(view: View) -> list[Panel]:
 
 
 def energy(view: View) -> list[Panel]:
-    """K, V and E from the start, the work of each source, and what the ledger leaves over, on an axis of its own.
+    """Return K, V and E since the start, the work of each source, and the residual of the ledger on a separate axis.
 
     Raises:
         PlotError: If they were not recorded.
@@ -122,7 +122,7 @@ def energy(view: View) -> list[Panel]:
 
 
 def tracking(view: View) -> list[Panel]:
-    """Tracking error of each joint, or of the frame along each axis.
+    """Return the tracking error of each joint, or of the frame along each axis.
 
     Raises:
         PlotError: If the run followed no reference.
@@ -134,19 +134,19 @@ def tracking(view: View) -> list[Panel]:
         )
     if run.desired is None:
         columns, units = [0, 1, 2], ["m"] * 3
-        each = zip("xyz", run.tracking_error.T, strict=True)
-        cells = [Cell(f"frame, {axis}", TIME, "p_d − p [m]", (Curve("error", run.t, y),)) for axis, y in each]
+        axes = zip("xyz", run.tracking_error.T, strict=True)
+        cells = [Cell(f"frame, {axis}", TIME, "p_d − p [m]", (Curve("error", run.t, y),)) for axis, y in axes]
     else:
         columns, units = list(view.joints), [view.unit("q", i) for i in view.joints]
         cells = [replace(_off(view, i), note="") for i in view.joints]
     off = run.tracking_error[:, columns]
-    rms = {unit: _rms(off[:, [each == unit for each in units]]) for unit in dict.fromkeys(units)}
+    rms = {unit: _rms(off[:, [of_joint == unit for of_joint in units]]) for unit in dict.fromkeys(units)}
     heading = "Tracking error, rms " + ", ".join(f"{x:.2e} {unit}" for unit, x in rms.items())
     return [Panel(heading, in_rows(cells, view.columns))]
 
 
 def phase(view: View) -> list[Panel]:
-    """Phase portrait of each joint: v over q."""
+    """Return the phase portrait of each joint: v over q."""
     run, cells = view.run, []
     for i, name in zip(view.joints, view.names, strict=True):
         path = Curve("path", run.q[:, i], run.v[:, i])
@@ -156,7 +156,7 @@ def phase(view: View) -> list[Panel]:
 
 
 def error_growth(view: View) -> list[Panel]:
-    """Estimated error of the positions, the largest over the joints, and the time until which it is resolved.
+    """Return the estimated error of the positions, largest over the joints, and the time until which it is resolved.
 
     Raises:
         PlotError: If the run has no estimate.
@@ -205,7 +205,7 @@ def _off(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
 
 
 def _ledger(view: View) -> list[Cell]:
-    """Energies, the work of each source if any was done, and the residual."""
+    """Return the energies, the work of each source if any did work, and the residual."""
     t, ledger = view.run.t, view.run.ledger
     E, V = ledger.energy, ledger.potential
     own = (("K", ledger.kinetic), ("V − V(0)", V - V[0]), ("E − E(0)", E - E[0]))
@@ -222,7 +222,7 @@ def _ledger(view: View) -> list[Cell]:
 
 
 def _growth(view: View, error: ErrorEstimate) -> Cell:
-    units = {unit("q", each) for each in view.types}
+    units = {unit("q", kind) for kind in view.types}
     of_q = units.pop() if len(units) == 1 else unit("q", None)
     until = error.until_s if error.until_s < error.t[-1] else np.inf
     curve = Curve("estimated error", error.t, error.error)
@@ -230,19 +230,19 @@ def _growth(view: View, error: ErrorEstimate) -> Cell:
 
 
 def _marks(run: TrajectoryData, i: int) -> tuple[float, ...]:
-    return tuple(each.t for each in run.events if each.joint in ("", run.joint_names[i]))
+    return tuple(event.t for event in run.events if event.joint in ("", run.joint_names[i]))
 
 
 def _legend(view: View, held: tuple[tuple[Rest, ...], ...]) -> str:
     """Return the legend of marks without an entry in the legend, for a heading."""
-    run, shown = view.run, [each for i in view.joints for each in held[i]]
+    run, shown = view.run, [rest for i in view.joints for rest in held[i]]
     legend = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
-    legend.append(("at a stop in colour", [each for each in shown if each.at_stop]))
+    legend.append(("at a stop in colour", [rest for rest in shown if rest.at_stop]))
     return "".join(f"; {text}" for text, some in legend if some)
 
 
 def _limits(view: View, **limits: np.ndarray) -> str:
-    """Which limits are drawn, for a heading."""
+    """Return the names of the drawn limits, for a heading."""
     shown = list(view.joints)
     peaks = {name: np.nan_to_num(np.abs(getattr(view.run, name)[:, shown])).max(axis=0) for name in limits}
     drawn = [name for name, x in limits.items() if ((peaks[name] > 0) & (peaks[name] >= NEAR * x[shown])).any()]

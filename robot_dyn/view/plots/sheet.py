@@ -45,12 +45,12 @@ class Panel:
     every: int = 1
 
     def tall(self, height: float) -> float:
-        """About how high it is, in [mm], with rows of a height."""
+        """Return its approximate height, in [mm], with rows of a given height."""
         return _HEADING + height * len(self.rows)
 
 
 def in_rows(cells: Sequence[Axes], most: int) -> tuple[tuple[Axes, ...], ...]:
-    """The cells in rows of `most` cells or fewer."""
+    """Return the cells in rows of `most` cells or fewer."""
     across = -(-len(cells) // -(-len(cells) // most))
     return tuple(tuple(cells[k : k + across]) for k in range(0, len(cells), across))
 
@@ -58,7 +58,7 @@ def in_rows(cells: Sequence[Axes], most: int) -> tuple[tuple[Axes, ...], ...]:
 def draw(
     panels: list[Panel], opening: str, remarks: Sequence[str], style: Style, width: float, diverged: bool
 ) -> Figure:
-    """The panels from top to bottom, under an opening and remarks in colour."""
+    """Draw the panels from top to bottom, below a title and remarks in colour."""
     from robot_dyn.view.plots.shown import Figure
 
     told = "\n".join(remarks)
@@ -81,14 +81,14 @@ def draw(
 
 
 def headed(figure: FigureBase, text: str, colour: str, **font: Any) -> None:
-    """A text above what a figure shows, in as many lines as its width takes."""
+    """Write a text above the contents of a figure, in as many lines as its width requires."""
     if text:
         placed = {"x": 0.01, "ha": "left", "wrap": True}
         figure.suptitle(drawable(text), **placed, color=colour, parse_math=False, **font)
 
 
 def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -> None:
-    """A panel in its part of the figure."""
+    """Draw a panel in its part of the figure."""
     if style.titled:
         headed(part, panel.heading, style.colours["ink"], fontsize=style.heading, weight="bold")
     across = max(map(len, panel.rows))
@@ -119,7 +119,7 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
 
 
 def _title(cell: Axes, letters: int) -> str:
-    """The title of a cell and its note, in lines of at most `letters` letters; long names break after "_"."""
+    """Return the title of a cell and its note, in lines of at most `letters` letters; long names break after "_"."""
     parts = [text for text in (shortened(cell.title, 2 * letters), cell.note) if text]
     in_one = ", ".join(parts)
     return (

@@ -35,7 +35,7 @@ _FLAGS = [
 
 
 def playwright() -> Any:
-    """Playwright's interface without coroutines.
+    """Return Playwright's synchronous interface.
 
     Raises:
         MissingExtraError: If it is not installed.
@@ -44,7 +44,7 @@ def playwright() -> Any:
 
 
 def installed(path: str | Path | None = None) -> Path | None:
-    """The program of a browser: the one at `path`, or the first on the path or at a known place; None if there is none.
+    """Return the program of a browser: `path`, or the first on the path or at a known place; None if there is none.
 
     Raises:
         VideoError: If the file at `path` cannot be run.
@@ -61,7 +61,7 @@ def installed(path: str | Path | None = None) -> Path | None:
 def frames(
     program: Path | None, text: str, times: np.ndarray, size: tuple[int, int], dark: bool
 ) -> Generator[bytes, None, None]:
-    """Pictures (PNG) of a page of a size in pixels at times; the browser ends with the last one.
+    """Yield pictures (PNG) of a page, of a size in pixels, at times; the browser ends with the last one.
 
     Raises:
         VideoError: If the browser does not start or show the page, or shows another time.
@@ -109,7 +109,7 @@ def _driver(api: Any, folder: str) -> Iterator[Any]:
 
 
 def _launched(chromium: Any, program: Path | None, folder: str, error: type[Exception]) -> Any:
-    """The browser, at work, with a folder for its temporary files."""
+    """Return the running browser; its temporary files are in a folder."""
     sandbox = not hasattr(os, "geteuid") or os.geteuid() != 0  # with one, browsers do not start for root
     environment = os.environ | {"TMPDIR": folder}
     options = {"args": _FLAGS, "chromium_sandbox": sandbox, "timeout": _PATIENCE_MS, "env": environment}

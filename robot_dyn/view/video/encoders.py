@@ -20,7 +20,7 @@ _PALETTE = "split[a][b];[a]palettegen[c];[b][c]paletteuse=dither=none"  # one fo
 
 
 def ffmpeg() -> Any:
-    """The module imageio_ffmpeg.
+    """Return the module imageio_ffmpeg.
 
     Raises:
         MissingExtraError: If it is not installed.

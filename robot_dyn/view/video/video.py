@@ -64,7 +64,7 @@ def save_video(
 
 
 def frame_times(duration_s: float, fps: int) -> np.ndarray:
-    """Times of the frames, in [s]; the last is at most the duration."""
+    """Return times of the frames, in [s]; the last is at most the duration."""
     count = floor(duration_s * fps + _ROUNDING) + 1
     return np.minimum(np.arange(count) / fps, duration_s)
 
@@ -84,7 +84,7 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 
 
 def _checked_times(duration_s: float, fps: int, kind: str, size: tuple[int, int]) -> np.ndarray:
-    """Times of the frames."""
+    """Return the times of the frames; raise a VideoError if their number or size is not allowed."""
     if not duration_s > 0:
         raise VideoError("the page has no run of a length above 0, so that nothing moves; .save(path) writes the page")
     count = duration_s * fps

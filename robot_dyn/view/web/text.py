@@ -32,7 +32,7 @@ _PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that mes
 
 
 def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
-    """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`.
+    """Return the HTML text of a document: title, outcome, notes, duration, scene, plots; commands unless it is `live`.
 
     Args:
         document: Of `document` or `still`.
@@ -59,18 +59,18 @@ def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
 
 
 def shared_viewer() -> str:
-    """The text of the script that several pages share: it puts the viewer, compressed, into the page."""
+    """Return the text of the script that several pages share: it puts the viewer, compressed, into the page."""
     return f'document.getElementById("meshcat").textContent = "{packed(_viewer().encode())}";\n'
 
 
 def _hashes(texts: Iterable[str]) -> str:
-    """The sources of a content policy that are these texts and no others [CSP 3, §2.3.1]."""
+    """Return the sources of a content policy that allow these texts only [CSP 3, §2.3.1]."""
     digests = (sha256(text.encode()).digest() for text in texts)
     return " ".join(f"'sha256-{b64encode(digest).decode()}'" for digest in digests)
 
 
 def _own_styles(meshcat: str) -> Iterator[str]:
-    """The styles that meshcat puts into its page: an empty one, filled later, and that of its panel."""
+    """Return the styles that meshcat puts into its page: an empty one, filled later, and that of its panel."""
     yield ""
     for text in _PANEL.findall(meshcat):
         yield json.loads(f'"{text}"')
@@ -81,7 +81,7 @@ def _viewer() -> str:
 
 
 def _meshcat() -> Path:
-    """The folder of the package meshcat; importing it would import IPython."""
+    """Return the folder of the package meshcat without importing it, which would import IPython."""
     found = find_spec("meshcat")
     assert found is not None and found.submodule_search_locations, "meshcat is a dependency"
     return Path(found.submodule_search_locations[0])

@@ -131,7 +131,7 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
         yield JointBudget(
             joint=name,
             type=kind,
-            **{key: round(x, _DIGITS) if key.endswith("_at") else x for key, x in numbers.items()},
+            **{key: round(x, _DIGITS) if key.endswith("_at_s") else x for key, x in numbers.items()},
             of_peak={cause: float(torque[at_peak[i], i]) for cause, torque in split.torques.items()},
             of_rms={cause: float(part[i] / rms[i]) if rms[i] else 0.0 for cause, part in parts.items()},
             cut=name in cut,
