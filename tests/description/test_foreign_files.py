@@ -60,7 +60,7 @@ def test_robot_of_a_run_is_read_again_from_the_text_that_the_run_carries(file: F
     texts = origin(robot)
 
     class Run:
-        about, joint_names = texts, robot.joint_names
+        metadata, joint_names = texts, robot.joint_names
 
     again = robot_of(Run())  # pyright: ignore[reportArgumentType]
     assert again.description.xml == robot.description.xml

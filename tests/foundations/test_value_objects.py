@@ -153,7 +153,7 @@ def test_values_keep_copies_of_what_they_are_given() -> None:
         (rd.control.ComputedTorque(ARM, PLAN, kp=x, kd=x), ("kp", "kd")),
         (rd.control.PID(PLAN, kp=x, ki=x, kd=x, effort_limit=x), ("kp", "ki", "kd", "effort_limit")),
         (rd.control.Samples(times, points), ("breaks", "coefficients")),
-        (rd.Setup(rd.Plant(ARM), x, x, about=about), ("q0", "v0", "about")),
+        (rd.Setup(rd.Plant(ARM), x, x, metadata=about), ("q0", "v0", "metadata")),
     ]
     arrays = [x, points, times]
     for kind in EFFECTS.values():

@@ -1,8 +1,8 @@
 """A Moreau–Jean step of a state equation: the convex problem, its solution, and the state after the step.
 
-    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r the impulses of friction and stops:  −r ∈ h f ∂|v⁺| + 𝓝(v⁺)
+    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r the impulses of friction and stops:  −r ∈ h f ∂|v⁺| + Nc(v⁺)
 
-at q_m = q + h/2 v, with 𝓝 the normal cone of the bounds of v⁺. The work of a force is its impulse times the mean
+at q_m = q + h/2 v, with Nc the normal cone of the bounds of v⁺. The work of a force is its impulse times the mean
 velocity (v + v⁺)/2, so that the energy ledger contains the energy removed by stops and friction. Functions work on
 floats, or on symbols for machine code; see `integrate.time_stepping`.
 """
