@@ -115,7 +115,7 @@ def test_the_best_that_is_named_can_be_had() -> None:
     below = r"is not attainable: the estimated error is .* at DOP853's smallest tolerance, 2.2e-14; use accuracy \d"
     with pytest.raises(AccuracyError, match=below) as caught:
         rd.simulate(ARM, START, duration_s=1.0, accuracy=1e-16)
-    best = float(str(caught.value).rpartition("ask for ")[2])
+    best = float(str(caught.value).rpartition("use accuracy ")[2])
     assert rd.simulate(ARM, START, duration_s=1.0, accuracy=best).accuracy.estimated <= best
 
 

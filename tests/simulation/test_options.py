@@ -106,7 +106,7 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.simulate(ARM, plant=PLANT, q0=Q), "simulate: no option 'plant'"),
         (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, of shape \(2,\)"),
         (lambda: rd.rollouts(ARM, method="RK4"), r"rollouts: give q0, the position at the start, of shape \(2,\)"),
-        (lambda: rd.rollouts(ARM, np.zeros((0, 2)), method="RK4"), "of one number of runs"),
+        (lambda: rd.rollouts(ARM, np.zeros((0, 2)), method="RK4"), "the same number of runs"),
         (
             lambda: rd.rollouts(ARM, Q, method="RK4", events=[rd.Event(lambda t, q, v: v[0])], cuts=False),
             "cuts=False: steps end at events, so the runs are not in lock step",

@@ -125,7 +125,7 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         assert remark.text.endswith(" (at samples and 200 instants)") if seen else remark.text == of[0].text
         assert remark.looked == B
         if remark.kind is RemarkKind.STOP_REACHED:  # how far beyond it, as runs are compared
-            assert f" {remark.value:.4g} of {remark.limit:.4g} " in remark.text
+            assert f" {remark.value:.4g} m (stop at {remark.limit:.4g}) " in remark.text
         assert f"{remark.text} (run {remark.runs[0]}; {len(of)} of {B} runs)" in "; ".join(remark_lines([remark]))
     assert all(line in runs.summary for line in remark_lines(runs.remarks))
     assert f"rd.simulate(runs.setup_of({runs.worst})) repeats it" in runs.summary
