@@ -46,7 +46,7 @@ class Reason(StrEnum):
     STEP_TOO_LONG = "step_too_long"
     """The fixed step exceeds the stability limit of the method at the start of the run.
 
-    Take the step that the message names, or Rodas5PFixed, which is stable at any step.
+    Use the step that the message names, or Rodas5PFixed, which damps fast motions at any step.
     """
 
     IMPLAUSIBLE_SPEED = "implausible_speed"
