@@ -30,6 +30,8 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
     assert found["status"] == {"runs": 96, "chunks": 2, "missing": 0}
     assert found["specification"]["design"] == "latin" and found["probabilities"]["failed"]["estimate"] == 0.0
     assert "SHA-256" in command.run("sweep", "verify", str(out)).stdout
+    for setting in (("--runs", "40"), ("--seed", "0"), ("--vary", "q0=[0.1]")):  # the folder keeps its own
+        assert command.run("sweep", "run", str(out), *setting).returncode == 2
     assert command.run("sweep", "export", str(out), "-o", str(tmp_path / "rows.csv")).returncode == 0
     assert len((tmp_path / "rows.csv").read_text().splitlines()) == 97
 

@@ -81,6 +81,14 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: give the folder of a sweep, robot-dyn sweep {what} FOLDER")
+        of_scenes = {
+            "--runs": runs, "--vary": vary, "--samples": samples, "--design": design, "--seed": seed, "--chunk": chunk,
+        }  # fmt: skip
+        if ignored := [name for name, value in of_scenes.items() if value not in (None, [], ())]:
+            raise SweepError(
+                f"{', '.join(ignored)}: for a scene only; the sweep in {folder} keeps its settings; to change them, run"
+                " its scene into another folder: robot-dyn sweep SCENE.toml … -o FOLDER"
+            )
         result = sw.read_sweep(folder, scene, figures)
         if what == "run":
             result = _run(result.sweep, folder, options)
