@@ -159,6 +159,7 @@ def of_coordinates(robot: Structure, stated: tuple[Statement, ...]) -> dict[str,
     result: dict[str, dict[str, float]] = {name: {} for name in robot.free}
     for joint, numbers in of_joints.items():
         source, ratio, offset = resolve(joint, robot.mimics, FLOAT64)
+        ratio, offset = float(ratio), float(offset)
         own = result[source]
         if ARMATURE in numbers:
             own[ARMATURE] = own.get(ARMATURE, 0.0) + ratio**2 * numbers[ARMATURE]
