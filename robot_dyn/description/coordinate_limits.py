@@ -72,7 +72,7 @@ def _limits(robot: Structure, interval: Callable[[StatedJoint], Interval]) -> di
         source, ratio, offset = resolve(name, robot.mimics, FLOAT64)
         if name in robot.mimics and ratio != 0:
             shift = offset if interval is _positions else 0.0
-            # Python's floats: a quotient beyond their range is inf, which is no limit
+            # Python's floats: a quotient beyond their range becomes inf, without a limit
             of_followers[source][name] = interval(robot.joints[name]), float(ratio), float(shift)
     return {name: _intersection(interval(robot.joints[name]), followers) for name, followers in of_followers.items()}
 
