@@ -298,7 +298,7 @@ def _explained(document: Document, name: str, body: Body, finding: Finding) -> F
     if not candidates:
         return finding
     mistakes = ", or ".join(candidate.mistake for candidate in candidates)
-    what = f"{finding.what}: suspected {mistakes}"
+    what = f"{finding.what}: possible mistake: {mistakes}"
     if len(candidates) > 1:
         return replace(finding, what=what)
     (texts,) = [candidate.texts for candidate in candidates]
