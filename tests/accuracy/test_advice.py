@@ -216,7 +216,7 @@ def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:
     assert rd.simulate(plant, [0.4, -0.7], method="RK4", step_s=1e-2, duration_s=0.2).outcome.ending == "diverged"
     chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.05)
     assert chosen.stable
-    assert "auto controls its steps" in chosen.text
+    assert "auto adapts its steps" in chosen.text
 
 
 def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:

@@ -365,9 +365,9 @@ def test_what_has_no_meaning_is_refused() -> None:
     for message, options in {
         "q0 must be finite, got nan for joint": {"q0": bad},
         r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
-        "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
-        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "vary": {"kp": ones}},
-        "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
+        "the same number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
+        r"the same number of runs, .*'kp': \(3,\)": {"q0": starts(4), "vary": {"kp": ones}},
+        "the same number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
         r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"vary": {"mass_scale": 1.1}},
         "no 'kq'; nearest: k": {"vary": {"kq": ones}},
         "no 'viscous_friction.visc'; nearest: viscous_friction.viscous": {"vary": {"viscous_friction.visc": ones}},
