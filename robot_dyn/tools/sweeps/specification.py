@@ -133,7 +133,16 @@ class Specification(BaseModel):
             }
             design, drawn = (rows, None) if self.design == "table" else (self.design, rows)
             return Sweep(
-                scene, self.runs, vary, sweep_figures, design, self.seed, self.samples, self.uncut, drawn, stated
+                scene,
+                self.runs,
+                vary,
+                sweep_figures,
+                design,
+                self.seed,
+                self.samples,
+                uncut=self.uncut,
+                drawn=drawn,
+                stated=stated,
             )
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise SweepError(f"{folder / FILE}: is not the specification of a sweep ({error!r})") from None

@@ -40,8 +40,8 @@ class Sweep(Answer, Value):
             each varying number.
         seed: Seed of the design.
         samples: Samples to keep: "q", or `samples("q", "u", every=100)`; none by default.
-        uncut: True for steps that pass thresholds, in lock step, see `rollouts`. The result says how much figures of
-            64 runs, drawn at random, differ from runs with steps that end at thresholds.
+        uncut: True for steps that pass thresholds, in lock step, see `rollouts`. The result compares figures of
+            64 runs, drawn at random, with those of runs whose steps end at thresholds.
         drawn: The rows of the design, (N, d), as stored in a folder; None to draw them by name and seed.
         stated: The setup as stated in a folder, if its reader has not named the function that returns it; else None.
 
