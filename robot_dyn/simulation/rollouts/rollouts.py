@@ -24,7 +24,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.coefficients import rebuilt
 from robot_dyn.foundations.errors import QueryError, nearest, shown
-from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, truth
+from robot_dyn.foundations.validate import JointValues, choice, integer, joint_values, numbers, truth
 from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, Adaptive
 from robot_dyn.queries.dynamics import Dynamics
@@ -51,8 +51,8 @@ RECORDS = ("q", "v", "u", "energy", "work")
 @takes_options
 def rollouts(
     what: Setup | Plant | Dynamics,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     *,
     vary: Mapping[str, ArrayLike] | None = None,
     record: Iterable[str] = ("q", "v"),
@@ -131,8 +131,8 @@ def rollouts(
 
 def batch_of(
     setup: Setup,
-    q0: ArrayLike | None,
-    v0: ArrayLike | None,
+    q0: JointValues | None,
+    v0: JointValues | None,
     vary: Mapping[str, ArrayLike],
     record: Iterable[str],
     numbers: ArrayLike | None = None,
@@ -233,7 +233,7 @@ def _compared(batch: Batch, runs: Rollouts, threads: int, max_bytes: int) -> Com
     return Comparison(len(places), len(batch), others, tuple(differences(quantities, repeated, units)))
 
 
-def _setup(what: Setup | Plant | Dynamics, q0: ArrayLike | None, options: Mapping[str, Any]) -> Setup:
+def _setup(what: Setup | Plant | Dynamics, q0: JointValues | None, options: Mapping[str, Any]) -> Setup:
     """Return the setup of all runs; for a plant or robot, with the first start."""
     start = {}
     if not isinstance(what, Setup):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 
@@ -27,7 +27,9 @@ _RECORDS = ("q", "v", "u", "energy", "work")
 Look = Callable[[float], object]
 
 
-class OneByOne(NamedTuple):
+@final
+@dataclass(frozen=True)
+class OneByOne:
     """Runs made one by one, not in lock step.
 
     Attributes:
@@ -39,6 +41,9 @@ class OneByOne(NamedTuple):
     runs: int
     runs_s: float
     all_s: float
+
+    def __add__(self, other: OneByOne) -> OneByOne:
+        return OneByOne(self.runs + other.runs, self.runs_s + other.runs_s, self.all_s + other.all_s)
 
 
 IN_LOCK_STEP = OneByOne(0, 0.0, 0.0)
@@ -109,8 +114,7 @@ class Work:
         def use(runs: np.ndarray, result: Rollouts) -> None:
             nonlocal alone
             ran = result.statistics
-            count, run_s, all_s = alone
-            alone = OneByOne(count + ran.one_by_one, run_s + ran.one_by_one_s, all_s + ran.wall_s)
+            alone += OneByOne(ran.one_by_one, ran.one_by_one_s, ran.wall_s)
             if selection is not None and t is not None:
                 selected = selection.of(runs, result.diverged)
                 _check_times(result.t, t)
