@@ -60,10 +60,10 @@ class Engine:
             compiled, its kernel, and the checked functions for one state and for batches.
     """
 
-    traced: Callable[[Any], Traced]
-    quantities: Mapping[Any, Quantity]
+    traced: Callable[[Key], Traced]
+    quantities: Mapping[Key, Quantity]
     self_check: SelfCheck
-    truth: Callable[[Any, dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray | float]]
+    truth: Callable[[Key, dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray | float]]
     dtype: str
     threads: int
     store: Store | None
