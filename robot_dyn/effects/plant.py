@@ -21,8 +21,9 @@ from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import EffectError, MissingTimeError, OverflowedError, QueryError, shown
+from robot_dyn.foundations.names_nearest import NamesNearest
 from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
-from robot_dyn.foundations.values import Caching, NamesNearest, several
+from robot_dyn.foundations.values import Caching, several
 from robot_dyn.queries.dynamics import Dynamics, NanRows
 
 

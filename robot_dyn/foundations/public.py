@@ -35,10 +35,7 @@ def public_names(spec: Spec) -> tuple[Callable[[str], object], Callable[[], list
 
     def public(name: str) -> object:
         if name not in homes:
-            from robot_dyn.foundations.errors import nearest  # imported here: a light import needs no errors
-
-            remedy = "" if name.startswith("_") else f"; {nearest(name, names)}"
-            raise AttributeError(f"module {spec.name!r} has no attribute {name!r}{remedy}")
+            raise AttributeError(f"module {spec.name!r} has no attribute {name!r}")
         home = homes[name]
         return import_module(f"{home}.{name}") if home == spec.name else getattr(import_module(home), name)
 

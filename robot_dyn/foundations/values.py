@@ -5,14 +5,12 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import fields
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import prod
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, final
 
 import numpy as np
-
-from robot_dyn.foundations.errors import nearest
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -49,25 +47,6 @@ class ArrayField(Protocol):
     def __get__(self, part: object, kind: type | None = None) -> np.ndarray: ...
 
     def __set__(self, part: object, values: ArrayLike) -> None: ...
-
-
-class NamesNearest:
-    """An object that answers an unknown attribute by the names of the nearest ones."""
-
-    if not TYPE_CHECKING:  # so that a type checker reports unknown names
-
-        def __getattr__(self, name: str) -> Any:
-            if name.startswith("_") or hasattr(type(self), name):
-                return object.__getattribute__(self, name)  # raises the error of a property, or the usual one
-            raise AttributeError(_unknown(type(self), name))
-
-
-@lru_cache(256)  # code that probes for an attribute does so often
-def _unknown(kind: type, name: str) -> str:
-    """Return the message about an unknown attribute."""
-    names = {*dir(kind), *getattr(kind, "__dataclass_fields__", ())}
-    public = sorted(known for known in names if not known.startswith("_"))
-    return f"{kind.__name__} has no attribute {name!r}; {nearest(name, public)}"
 
 
 class Caching:

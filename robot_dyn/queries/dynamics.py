@@ -17,8 +17,8 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array, rounding
 from robot_dyn.foundations.errors import OverflowedError, SingularError, UndecidedError, shown
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.foundations.names_nearest import NamesNearest
 from robot_dyn.foundations.validate import JointValues, choice
-from robot_dyn.foundations.values import NamesNearest
 from robot_dyn.queries.quantity import DOUBTFUL, Quantity, query, table
 
 T = TypeVar("T")

@@ -132,8 +132,6 @@ def test_angles_beyond_the_limits_that_are_within_as_degrees_are_remarked(q: lis
         (rd.compiled(TWO), "coriolis", "coriolis_torque"),
         (rd.Lagrangian(TWO), "jacob", "jacobian"),
         (TWO.nan_rows, "forward", "forward_dynamics"),
-        (rd, "simulat", "simulate"),
-        (rd.effects, "ViscousFrction", "ViscousFriction"),
     ],
 )
 def test_an_unknown_attribute_names_the_nearest(owner: Any, name: str, near: str) -> None:
