@@ -10,8 +10,7 @@ from time import perf_counter
 from flint import ctx
 
 from robot_dyn import Setup
-from robot_dyn.foundations import Ball, QueryError, duration, function, instance, integer, number
-from robot_dyn.foundations.validate import JointValues
+from robot_dyn.foundations import Ball, JointValues, QueryError, duration, function, instance, integer, number
 from robot_dyn.tools.proof.enclosure.balls import NotProvenError
 from robot_dyn.tools.proof.enclosure.step import State, effort, proven_step
 from robot_dyn.tools.proof.hypotheses import assumed, start
