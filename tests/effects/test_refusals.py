@@ -115,7 +115,7 @@ IN_A_RUN = [
         for method, why in (("GaussLegendre4", "momenta"), ("Euler", "order 1"))
     ),
     *(
-        (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", cuts=False), f"cuts=False: {why}")
+        (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", uncut=True), f"uncut: {why}")
         for effect, why in (
             (DRY, "dry_friction stops and releases joints, where steps must"),
             (PLAY, "rigid_backlash stops and releases joints"),

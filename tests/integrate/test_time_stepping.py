@@ -232,8 +232,8 @@ def test_it_estimates_no_error_and_finds_no_events() -> None:
         rd.simulate(
             rd.Plant(ARM, [rd.effects.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, method="MoreauJean"
         )
-    with pytest.raises(QueryError, match=r"cuts=False: .* where steps must end"):
-        rd.rollouts(plant, [0.3, 0.2], method="RK4", step_s=1e-3, cuts=False)
+    with pytest.raises(QueryError, match=r"uncut: .* where steps must end"):
+        rd.rollouts(plant, [0.3, 0.2], method="RK4", step_s=1e-3, uncut=True)
 
 
 def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:
