@@ -192,7 +192,7 @@ def _examined(
         findings += [_assumed(text) for text in robot.description.findings if not _reported(text, findings)]
         shape_of, unread = shapes.shapes(robot, package_dirs)
         findings += [_of_mesh(note) for note in unread]
-        sheet, estimates = _compared(estimates, stated, {name for name in shape_of})
+        sheet, estimates = _compared(estimates, stated, set(shape_of))
         # shapes may change in the next round of repairs, so masses are estimated in the last one
         missing = [
             *missing_inertials(document, robot.description, shape_of, estimates if estimated else None, package_dirs)
@@ -211,7 +211,7 @@ def _examined(
         findings += neighbours.odd_masses(document, stated, volumes)
         findings += () if sheet is None else neighbours.of_data_sheet(document, stated, sheet)
         findings += gravity_load.weak_joints(document, robot, findings)
-        conversions = [x for x in findings if x.changes and (x.supposed and units or x.kind == "inertia_unit")]
+        conversions = [x for x in findings if x.changes and ((x.supposed and units) or x.kind == "inertia_unit")]
         if conversions:
             document = _rewritten(document, conversions)
     loads = refusal is None and not any(finding.kind == "refused" for finding in findings)
