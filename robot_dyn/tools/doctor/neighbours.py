@@ -16,7 +16,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.description import GIMBAL, SEVERAL, StatedLink, Structure
-from robot_dyn.foundations import QueryError, nearest
+from robot_dyn.foundations import QueryError, nearest, shown
 from robot_dyn.model import findings as doctor
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
@@ -117,12 +117,14 @@ def checked_unit(unit: str) -> str:
 
 def _named(unit: Any) -> tuple[int, str]:
     """Return the power of ten by which a unit of inertia is smaller than kg m², and its name."""
-    plain = "".join(str(unit).replace("²", "2").replace("^", "").replace("*", "").replace("·", "").split())
+    if not isinstance(unit, str):
+        raise QueryError(f"inertia_unit must be text, for example 'kg mm2', got {shown(unit)}")
+    plain = "".join(unit.replace("²", "2").replace("^", "").replace("*", "").replace("·", "").split())
     for factor, name in UNITS.items():
         if plain == name.replace("²", "2").replace(" ", ""):
             return round(np.log10(factor)), name
     raise QueryError(
-        f"inertia_unit: {unit!r} is not a unit that can be converted; {nearest(str(unit), UNITS.values())}"
+        f"inertia_unit: {shown(unit)} is not a unit that can be converted; {nearest(unit, UNITS.values())}"
     )
 
 
