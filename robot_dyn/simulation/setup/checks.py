@@ -42,7 +42,9 @@ def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_
     _check_set_valued(plant, method, finds_events)
     _check_payloads(plant, method)
     if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
-        raise QueryError(f"{drives[0].name}: {method.name} cannot integrate the motors of a drive; take method='DOP853'")
+        raise QueryError(
+            f"{drives[0].name}: {method.name} cannot integrate the motors of a drive; take method='DOP853'"
+        )
 
 
 def check_start(
