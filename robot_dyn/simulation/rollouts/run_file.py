@@ -14,7 +14,7 @@ from robot_dyn.simulation.results.provenance import packed
 from robot_dyn.simulation.results.run_file import REMEDY, RUN, RunFileError, are_times, version_remedy
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 
-FORMAT = "rollouts 7"
+FORMAT = "rollouts 8"
 
 Runs = TypeVar("Runs", bound=RolloutsData)
 
