@@ -238,9 +238,9 @@ class _Artist:
 
     def mesh(self, element: Any) -> tuple[Part, ...]:
         address = element.get("filename")
-        path, scale = self.file(address), elements.numbers(element, "scale", 3, "1 1 1")
+        scale = elements.numbers(element, "scale", 3, "1 1 1")
         try:
-            parts, complaints = self._read(path, scale, self._turned)
+            parts, complaints = self._read(self.file(address), scale, self._turned)
         except MeshError as error:
             raise MeshError(f"mesh {shown(address)}: {error}") from None
         if element.get("materials") == "ignored":  # of MJCF, whose geoms state the colour
