@@ -127,6 +127,8 @@ def _edits(locked: Mapping[str, float], payloads: Iterable[Payload]) -> Iterator
 def _other_edits(edits: Edits) -> Iterator[str]:
     if edits.mass_scale != 1:
         yield f"mass_scale: {edits.mass_scale:g}"
+    if edits.mass_scales:
+        yield f"mass_scales: {', '.join(f'{link} {x:g}' for link, x in edits.mass_scales)}"
     for name, changed in (("armature", edits.armature), ("mass", edits.masses), ("inertia", edits.inertias)):
         if changed:
             yield f"{name} changed: {', '.join(key for key, _ in changed)}"

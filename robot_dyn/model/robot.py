@@ -372,8 +372,9 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         Args:
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
                 several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg], or
-                "urdf" for `stated_armature`; mass_scale; masses and inertias: values by link that replace the
-                file's, in [kg], and (3, 3) in [kg m²].
+                "urdf" for `stated_armature`; mass_scale: factor on mass and inertia of all links; mass_scales: the
+                same by link, for another density; masses and inertias: values by link that replace the file's, in [kg],
+                and (3, 3) in [kg m²], where masses alone leave the inertia as it is.
 
         Raises:
             EditError: If a name is unknown or a value is not allowed, or "urdf" is given and the file states none.

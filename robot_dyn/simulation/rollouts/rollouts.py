@@ -82,7 +82,8 @@ def rollouts(
             gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
             of a kind, "external_wrench 2.wrench"; "gravity", (B, 3); mass in [kg] and centre of mass of a payload on a
             link, "payload_mass:tool0" and "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and
-            inertia of a link, see `Robot.with_`, "link3.mass" and "link3.inertia", (B, 3, 3). Models of controllers
+            inertia of a link, see `Robot.with_`, "link3.mass" and "link3.inertia", (B, 3, 3), or a factor on both,
+            "link3.mass_scale". Models of controllers
             have separate values: "model.gravity", ….
         record: Quantities to record at the samples: some of "q", "v", "u", "energy", "work". Only `simulate` records
             states of effects and controllers.

@@ -34,15 +34,17 @@ def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_
     """
     if events and not finds_events:
         raise QueryError(
-            f"events: steps of {method.name} cannot end at events; take method='DOP853'"
+            f"events: steps of {method.name} cannot end at them; take method='DOP853'"
             if method.nonsmooth
-            else f"events: runs of more than {MOST_CUT} steps of {method.name} cannot be cut at events; take longer"
-            " steps, or method='DOP853'"
+            else f"events: in a run of more than {MOST_CUT} steps of {method.name}, steps cannot end at them; take"
+            " longer steps, or method='DOP853'"
         )
     _check_set_valued(plant, method, finds_events)
     _check_payloads(plant, method)
     if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
-        raise QueryError(f"{drives[0].name}: {method.name} does not support the motors of drives; take method='DOP853'")
+        raise QueryError(
+            f"{drives[0].name}: {method.name} cannot integrate the motors of a drive; take method='DOP853'"
+        )
 
 
 def check_start(
@@ -114,7 +116,7 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
                 " take method='DOP853', or 'MoreauJean' with a step_s"
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
-        raise QueryError(f"{other[0].name}: is not supported by {method.name}; take method='DOP853'")
+        raise QueryError(f"{other[0].name}: cannot be stepped by {method.name}; take method='DOP853'")
 
 
 def _check_payloads(plant: Plant, method: Method) -> None:

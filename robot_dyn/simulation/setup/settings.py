@@ -68,7 +68,7 @@ def edits_by_name(robot: object) -> Iterator[Setting]:
     for payload in edits.payloads:
         yield f"payload on {payload.frame}", _payload(payload)
     yield "mass_scale", _text(edits.mass_scale)
-    for key in ("lock", "armature", "masses", "inertias"):
+    for key in ("lock", "armature", "mass_scales", "masses", "inertias"):
         yield from ((f"{key}.{name}", _text(np.array(value))) for name, value in getattr(edits, key))
 
 
