@@ -70,7 +70,7 @@ def write(run: TrajectoryData, columns: list[Column], stream: BinaryIO) -> None:
 
 
 def _causes(run: TrajectoryData) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Return the joint torque due to each cause, (m, n), or the reason why none is available."""
+    """Return the joint torque due to each cause, (m, n), or the reason why it is unavailable."""
     try:
         return causes_of(run).torques, {}
     except QueryError as error:
