@@ -101,7 +101,7 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
         )  # fmt: skip
     if unit is not None and power not in units:
         yield Finding(
-            Severity.NOTE, "inertia_unit", "robot", f"its moments do not look like {name}; the moments were not converted",
+            Severity.NOTE, "inertia_unit", "robot", f"its moments do not look like {name} and were not converted",
             f"choose {' or '.join(units.values())}" if units else "remove inertia_unit, or correct single links",
         )  # fmt: skip
 
