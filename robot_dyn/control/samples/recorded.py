@@ -169,10 +169,11 @@ def _refuse_two_series(t: np.ndarray) -> None:
         lower, upper = (lower, x) if x > upper else sorted((x, upper))
     k, pairs = back[0], (np.diff(t)[back] == 0).all()
     fault = "repeat" if pairs else "go back"
-    digits = ", or write the times with more digits" if pairs else ""
+    single = "write the times with more digits" if pairs else "sort the samples"
     raise PlanError(
         f"two publishers appear to be interleaved: times {fault} at {len(back)} of {len(t)} samples, first from"
-        f" {t[k]:.9g} to {t[k + 1]:.9g} s at sample {k + 2}; {TWO_PUBLISHERS}{digits}"
+        f" {t[k]:.9g} to {t[k + 1]:.9g} s at sample {k + 2}; {TWO_PUBLISHERS}; if there is"
+        f" only one, {single}"
     )
 
 
