@@ -40,8 +40,8 @@ class Recorded:
         t: Times, (m,), in [s].
         q: Positions, (m, n), in [m] or [rad]; unconverted where the unit is unknown.
         stated: True for joints with a known unit, (n,).
-        given: True for joints with a column, (n,); the others rest at q0.
-        of_time: True if the unit of the times is known.
+        has_column: True for joints with a column, (n,); the others rest at q0.
+        has_time_unit: True if the unit of the times is known.
         more: v and a, (m, n), if the table is the export of a run.
         note: Topic and origin of the times of a log.
     """
@@ -50,8 +50,8 @@ class Recorded:
     t: np.ndarray
     q: np.ndarray
     stated: np.ndarray
-    given: np.ndarray
-    of_time: bool
+    has_column: np.ndarray
+    has_time_unit: bool
     more: dict[str, np.ndarray]
     note: str
 
@@ -91,7 +91,7 @@ def recorded(
     if joints is not None:
         instance("joints", joints, Mapping, "give the column of each joint, {joint: column}", error=PlanError)
     table = table_of(source, arm.joint_names, joints or {}, topic, time)
-    heads, t, of_time = _times(table, time, least)
+    heads, t, has_time_unit = _times(table, time, least)
     at = _joints(arm, heads, joints)
     absent = [name for name in arm.joint_names if name not in at]
     if absent and (q0 is None or not at):
@@ -110,7 +110,9 @@ def recorded(
                     " correct or remove it"
                 )
     more = {} if joints is not None else _rates(arm, heads, unit)
-    return Recorded(arm, t, q, stated, np.array([name in at for name in arm.joint_names]), of_time, more, table.note)
+    return Recorded(
+        arm, t, q, stated, np.array([name in at for name in arm.joint_names]), has_time_unit, more, table.note
+    )
 
 
 def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
