@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import warnings
 from copy import deepcopy
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -124,7 +124,8 @@ def _draw(out: Any, description: Description, folder: Path) -> None:
     source = Path(description.source)
     for element in out.iter("mesh", "texture") if source.is_file() else ():
         address = element.get("filename") or ""
-        if address and "://" not in address and not Path(address).is_absolute():
+        rooted = Path(address).is_absolute() or PureWindowsPath(address).drive or address.startswith("file:")
+        if address and "://" not in address and not rooted:
             element.set("filename", Path(os.path.relpath(source.absolute().parent / address, folder)).as_posix())
 
 

@@ -206,6 +206,9 @@ def test_a_missing_scene_is_told(tmp_path) -> None:
     (tmp_path / "latin.toml").write_bytes(b'robot = "\xe9"')
     with pytest.raises(SceneError, match="is not UTF-8 text"):
         rd.read_scene(tmp_path / "latin.toml")
+    run = rd.simulate(rd.load("planar_2r"), [0.1, 0.2], duration_s=0.01).save(tmp_path / "run.npz")
+    with pytest.raises(SceneError, match="is a run file"):
+        rd.read_scene(run)
 
 
 def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:

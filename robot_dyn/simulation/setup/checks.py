@@ -83,7 +83,7 @@ def check_model(plant: Dynamics, controller: Controller, q0: np.ndarray) -> None
             if name != plant_name:
                 raise QueryError(
                     f"the controller's model has the joint {name!r} where the plant has {plant_name!r}; lock the same"
-                    " joints of both"
+                    " joints in both"
                 )
     if controller.task_frame is not None:
         plant.placement(q0, controller.task_frame)  # raises an error for an unknown link
@@ -123,7 +123,7 @@ def _check_payloads(plant: Plant, method: Method) -> None:
     """Check that a method can continue after a payload has been picked up or dropped."""
     for is_unsuited, reason in (
         (method.canonical, f"picking up or dropping a payload changes momenta, which {method.name} integrates"),
-        (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
+        (method.nonsmooth, f"steps of {method.name} do not end where the payload is picked up or dropped"),
     ):
         if plant.equation_of_motion.payloads and is_unsuited:
             raise QueryError(f"carried_payload: {reason}; take method='DOP853'")
@@ -137,7 +137,7 @@ def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:
         for force, torque in zip(plant.forces, torques, strict=True):
             _check_returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
             if any(threshold.of_actuation for threshold in force.thresholds(dynamics.n)):
-                raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
+                raise EffectError(f"{force.name}: only bounds may have thresholds of the actuation")
         u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
         u, reached = equation.applied(u, z)
         names = (type(plant.effects[k]).__name__ for k in equation.states)
@@ -187,4 +187,4 @@ def _check_returned(name: str, values: Any, n: int, row: str = "joint", *, error
         problem = str(failure)
     if problem:
         count = f"{n} {row}{'s' if n > 1 else ''}"
-        raise error(f"{name} returned {problem} for {count} at the start; it must be finite numbers of shape ({n},)")
+        raise error(f"{name} returned {problem} for {count} at the start; return finite numbers of shape ({n},)")

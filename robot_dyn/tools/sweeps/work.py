@@ -17,7 +17,7 @@ from robot_dyn.simulation import MOST_BYTES, parts_of_run
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
 from robot_dyn.simulation.rollouts.lock_step import LANES
-from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
+from robot_dyn.simulation.rollouts.rollouts import batch_of, run_batch, stepping_groups
 from robot_dyn.tools.sweeps.figures import Runs
 from robot_dyn.tools.sweeps.rows import FIXED, RAISED, Rows, empty, joined
 from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
@@ -168,7 +168,7 @@ class Work:
         batch, reasons = self._batch(np.array([i]), self.sweep.values(i, i + 1), _RECORDS)
         if batch is None:
             raise SweepError(f"run {i} raised: {reasons[0]}")
-        ((_, passed),) = manners(batch)
+        ((_, passed),) = stepping_groups(batch)
         return run_batch(batch, passed, self.sweep.uncut, 1, MOST_BYTES)[0]
 
     def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
@@ -201,7 +201,7 @@ class Work:
 
         def made(places: np.ndarray) -> list[tuple[np.ndarray, Rollouts]]:
             some, results = batch.some(places), []
-            for at, passed in manners(some):
+            for at, passed in stepping_groups(some):
                 result = run_batch(some.some(at), passed, self.sweep.uncut, 1, MOST_BYTES, look)
                 if result.stopped.any():  # Ctrl-C during the runs
                     raise Stopped
