@@ -95,7 +95,7 @@ class GrowingLoop(NamedTuple):
         return {"otherwise": remedy(continuous_rate)}
 
     def _lower_gains(self) -> dict[str, float | str]:
-        """Return the largest fraction s = ½, ¼, … of the gains for which A + s B K is stable; empty if all are unstable."""
+        """Return the largest part s = ½, ¼, … of the gains with A + s B K stable; empty if all are unstable."""
         A, closed = self.loop.A, self.loop.continuous
         if closed.shape == A.shape:
             for s in 0.5 ** np.arange(1, _HALVINGS + 1):
