@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy import empty
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import DTypeLike
 
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
@@ -19,7 +19,7 @@ from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.threads import thread_count
 from robot_dyn.codegen.trace.trace import QUANTITIES, Trace, keyed
 from robot_dyn.description.inertial_parameters import Parametrised
-from robot_dyn.foundations.validate import choice, instance, truth
+from robot_dyn.foundations.validate import JointValues, choice, instance, truth
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.right_angles import RightAngle, completed
 from robot_dyn.model.robot import Robot
@@ -35,7 +35,7 @@ class _Derivatives(Dynamics[np.ndarray]):
     """Queries with the derivatives of forward dynamics."""
 
     def forward_dynamics_derivatives(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
+        self, q: JointValues, v: JointValues, tau: JointValues
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return ∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
         three = self._answer(_DERIVATIVES, (q, v, tau), None)
@@ -176,7 +176,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
     # --- queries that take half a microsecond and skip `_answer`
 
     def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: np.ndarray | None = None
+        self, q: JointValues, v: JointValues, a: JointValues, *, out: np.ndarray | None = None
     ) -> np.ndarray:
         y = empty(*self._vector) if out is None else out
         if not self._ones["inverse_dynamics"](q, v, a, y):
@@ -184,7 +184,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
         return self._answer("inverse_dynamics", (q, v, a), out)
 
     def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: np.ndarray | None = None
+        self, q: JointValues, v: JointValues, tau: JointValues, *, out: np.ndarray | None = None
     ) -> np.ndarray:
         y = empty(*self._vector) if out is None else out
         if not self._ones["forward_dynamics"](q, v, tau, y):

@@ -132,7 +132,7 @@ class Folder:
             "start": start,
             "stop": stop,
             "rows": digest_of([rows]),
-            "one_by_one": alone,
+            "one_by_one": asdict(alone),
         }
         try:
             footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
@@ -170,8 +170,8 @@ class Folder:
 
     def one_by_one(self) -> OneByOne:
         """Return how many runs of the present chunks were made one by one, and how long that took."""
-        footers = [self.footer(chunk)["one_by_one"] for chunk in np.flatnonzero(self.present()).tolist()]
-        return OneByOne(*map(sum, zip(*footers, strict=True))) if footers else IN_LOCK_STEP
+        chunks = np.flatnonzero(self.present()).tolist()
+        return sum((OneByOne(**self.footer(chunk)["one_by_one"]) for chunk in chunks), IN_LOCK_STEP)
 
     def read(self, chunk: int) -> Rows:
         """Return the rows of a chunk.

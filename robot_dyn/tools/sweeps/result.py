@@ -360,10 +360,11 @@ class SweepResult(Answer):
         if self.sweep.uncut:
             compared = self.folder.comparison()
             yield f"uncut: steps pass thresholds; {compared or 'not compared yet, sw.run(sweep, folder) does that'}"
-        count, runs_s, all_s = self.folder.one_by_one()
-        if count:
-            remedy = "; with uncut=True steps pass thresholds, in lock step" if runs_s < all_s else ""
-            yield f"{count} runs were made one by one, in {runs_s:.2g} s of {all_s:.2g} s over all threads{remedy}"
+        alone = self.folder.one_by_one()
+        if alone.runs:
+            remedy = "; with uncut=True steps pass thresholds, in lock step" if alone.runs_s < alone.all_s else ""
+            times = f"{alone.runs_s:.2g} s of {alone.all_s:.2g} s over all threads"
+            yield f"{alone.runs} runs were made one by one, in {times}{remedy}"
         reasons, why = self.folder.columns(("reason", "why")).values()
         for reason, count in list(self.reasons().items())[:_SHOWN]:
             yield f"{count} times {reason}, first: {why[self._failed & (reasons == reason)][0]}"

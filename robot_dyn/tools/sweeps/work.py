@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from robot_dyn.simulation import MOST_BYTES, parts_of_run
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
 from robot_dyn.simulation.rollouts.lock_step import LANES
-from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
+from robot_dyn.simulation.rollouts.rollouts import batch_of, run_batch, stepping_groups
 from robot_dyn.tools.sweeps.figures import Runs
 from robot_dyn.tools.sweeps.rows import FIXED, RAISED, Rows, empty, joined
 from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
@@ -27,7 +27,9 @@ _RECORDS = ("q", "v", "u", "energy", "work")
 Look = Callable[[float], object]
 
 
-class OneByOne(NamedTuple):
+@final
+@dataclass(frozen=True)
+class OneByOne:
     """Runs made one by one, not in lock step.
 
     Attributes:
@@ -39,6 +41,9 @@ class OneByOne(NamedTuple):
     runs: int
     runs_s: float
     all_s: float
+
+    def __add__(self, other: OneByOne) -> OneByOne:
+        return OneByOne(self.runs + other.runs, self.runs_s + other.runs_s, self.all_s + other.all_s)
 
 
 IN_LOCK_STEP = OneByOne(0, 0.0, 0.0)
@@ -109,8 +114,7 @@ class Work:
         def use(runs: np.ndarray, result: Rollouts) -> None:
             nonlocal alone
             ran = result.statistics
-            count, run_s, all_s = alone
-            alone = OneByOne(count + ran.one_by_one, run_s + ran.one_by_one_s, all_s + ran.wall_s)
+            alone += OneByOne(ran.one_by_one, ran.one_by_one_s, ran.wall_s)
             if selection is not None and t is not None:
                 selected = selection.of(runs, result.diverged)
                 _check_times(result.t, t)
@@ -164,7 +168,7 @@ class Work:
         batch, reasons = self._batch(np.array([i]), self.sweep.values(i, i + 1), _RECORDS)
         if batch is None:
             raise SweepError(f"run {i} raised: {reasons[0]}")
-        ((_, passed),) = manners(batch)
+        ((_, passed),) = stepping_groups(batch)
         return run_batch(batch, passed, self.sweep.uncut, 1, MOST_BYTES)[0]
 
     def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
@@ -197,7 +201,7 @@ class Work:
 
         def made(places: np.ndarray) -> list[tuple[np.ndarray, Rollouts]]:
             some, results = batch.some(places), []
-            for at, passed in manners(some):
+            for at, passed in stepping_groups(some):
                 result = run_batch(some.some(at), passed, self.sweep.uncut, 1, MOST_BYTES, look)
                 if result.stopped.any():  # Ctrl-C during the runs
                     raise Stopped
