@@ -103,7 +103,7 @@ class Periods:
     @property
     def y(self) -> np.ndarray:
         """States of all runs, (B, m): q, v, states of the controller and of effects, works in the latest period."""
-        return self._by_run(self._y)
+        return self._y.transpose(0, 2, 1).reshape(-1, self._equation.size)[: self._count]
 
     def write(self, runs: np.ndarray, y: np.ndarray, ended: np.ndarray) -> None:
         """Write states of some runs, (B,), from states y of all runs (B, m); `ended` is True for diverged runs."""
@@ -128,7 +128,3 @@ class Periods:
                 position.budget[0] = np.iinfo(np.int64).max
                 call()
         return 0
-
-    def _by_run(self, x: np.ndarray) -> np.ndarray:
-        """Return an array (tiles, rows, LANES) as (B, rows)."""
-        return x.transpose(0, 2, 1).reshape(-1, x.shape[1])[: self._count]

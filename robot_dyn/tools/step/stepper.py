@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike
 import robot_dyn as rd
 from robot_dyn.codegen import thread_count
 from robot_dyn.foundations import MissingTimeError, QueryError, duration, instance, integer, joint_values, shown
+from robot_dyn.integrate import Integrator
+from robot_dyn.queries import Dynamics
 from robot_dyn.simulation import Periods, batch_of
 from robot_dyn.tools.step.action import TORQUE, HeldTorque
 
@@ -66,7 +68,8 @@ class Stepper:
     """
 
     def __init__(
-        self, plant: Any, n: int = 4096, *, period_s: float = 0.02, step_s: float | None = 1e-3, method: Any = "RK4",
+        self, plant: rd.Plant | Dynamics[np.ndarray], n: int = 4096, *, period_s: float = 0.02,
+        step_s: float | None = 1e-3, method: str | Integrator = "RK4",
         vary: Mapping[str, ArrayLike] | None = None, uncut: bool = False, threads: int | None = 1,
     ) -> None:  # fmt: skip
         self._n, self._period_s = integer("n", n, least=1), duration("period_s", period_s)
