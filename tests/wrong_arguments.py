@@ -234,7 +234,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.stress.stress, robot=robot, samples=100, runs=0, seed=3, budget_s=1e-3, on_progress=lambda
             spent, what: None),
         call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
-            density=1000.0, allow_overlap=False, units=True, xacro=None),
+            density=1000.0, allow_overlap=False, units=True,
+            inertia_unit="kg mm2", xacro=None),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
         call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), least=0.5, above=0.5,
