@@ -38,7 +38,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 # Made by the library: their constructors take what it computed.
 RESULTS = {
     "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "Stress", "SweepResult",
+    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "Stress", "SweepResult",
     "Trajectory", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
@@ -76,7 +76,7 @@ LAX |= {name: {key for key, each in declared(kind).items() if each.infinite} for
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.stress, rd.tools.sweeps)
+TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.step, rd.tools.stress, rd.tools.sweeps)
 ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
