@@ -52,7 +52,7 @@ from robot_dyn.simulation.simulate import simulate
 _PILOT_STATES = 9  # along the pilot run
 _FAST_STATES = 3  # of these, the fastest ones, at which limits are computed
 _MAX_STEPS = 200_000  # in a run for the error estimate
-_MAX_GROWTH = 1e3  # of deviations over such a run
+_MAX_GROWTH = 1e3  # largest growth of deviations over such a run
 
 State = tuple[float, Array]  # t and y
 

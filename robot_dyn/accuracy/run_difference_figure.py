@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH, _ROW_HEIGHT, _MARGIN = 13.0, 3.6, 1.5  # [inch]: the sheet, a row of joints, heading and legend
-_MAX_COLUMNS, _MAX_JOINTS = 4, 64  # of one figure
+_MAX_COLUMNS, _MAX_JOINTS = 4, 64  # largest numbers of columns and joints in one figure
 _LETTERS = 96  # in the names of a row of joints
 
 

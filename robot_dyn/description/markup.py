@@ -12,7 +12,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.foundations.errors import DescriptionError, shorten
 
-MAX_DEPTH = 32  # of nested elements; a URDF needs 6
+MAX_DEPTH = 32  # deepest nesting of elements; a URDF needs 6
 
 # Atomic groups avoid backtracking over many blanks or comments.
 _LATE_DECLARATION = re.compile(rb"(\xef\xbb\xbf)?((?>\s++|<!--(?>.*?-->))*+)(<\?xml\s[^>]*\?>)", re.DOTALL)

@@ -12,7 +12,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 
 NONE = 2.0  # returned without a root
-_NARROW = 1e-13  # of a step: width of an interval that is not divided further
+_NARROW = 1e-13  # fraction of a step: an interval this narrow is not divided further
 _MAX_DEPTH = 64  # more halvings are useless in floats
 
 

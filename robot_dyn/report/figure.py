@@ -13,7 +13,7 @@ from robot_dyn.view.plots.sheet import headed
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
-_PART = 0.75  # of the width, on the page of a notebook, which is narrower than paper
+_PART = 0.75  # fraction of the width, on the page of a notebook, which is narrower than paper
 _PAD = 0.08  # [inch] around axes and texts
 
 Colours = Mapping[str, Any]

@@ -18,7 +18,7 @@ from robot_dyn.description import catalog
 from robot_dyn.foundations.errors import CatalogError, shorten
 from robot_dyn.shapes.mesh_files import MeshError
 
-_LEVELS = 4  # of folders above a URDF that may be its package, as in package/robots/arm/urdf
+_LEVELS = 4  # number of folders above a URDF that may be its package, as in package/robots/arm/urdf
 _LONGEST = 8  # parts of the longest end of a path that is searched
 
 

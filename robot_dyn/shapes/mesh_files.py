@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from trimesh.resolvers import FilePathResolver
 
 MAX_BYTES = 64 * 2**20  # per mesh or texture; the largest in example-robot-data has 28 MiB
-MAX_NODES = 20_000  # of a scene, counting every instance
+MAX_NODES = 20_000  # largest number of nodes of a scene, counting every instance
 _SHAPING = {
     "EXT_mesh_gpu_instancing": "instances by EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression": "buffers compressed by EXT_meshopt_compression",

@@ -95,7 +95,7 @@ class Page:
 
         Args:
             path: The file.
-            fps: Frames a second, 1 to 240, of a .gif to 50; 60 of an .mp4 and 25 of a .gif if not given.
+            fps: Frames per second, 1 to 240, or to 50 for a .gif. Default 60 for an .mp4, 25 for a .gif.
             size: Width and height in pixels, even numbers from 160 to 3840.
             dark: Whether it is drawn for dark screens.
             browser: Path of the browser; the first of this machine if not given.

@@ -45,7 +45,7 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 
-_PARTED = 1e-9  # of the positions: runs that differ by more have parted
+_PARTED = 1e-9  # fraction of the positions: runs that differ by more have parted
 _COARSE = 1e-6  # same, if the second run could not be refined down to rounding
 _STAGNANT = 0.3  # decades: if doubling the number of steps gains less, the run is fully refined
 _ORDERLY = 1e-6  # distance at the first record below which refinement is judged
@@ -53,12 +53,12 @@ _ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that ends refinement: 
 _ROUGH, _ROUGHLY = 1e-11, 1e-6  # a looser tolerance; the horizon ends where its run is this far from the first
 _MAX_LATE = 3  # runs of one method that may take too long
 _LOST = 0.1  # [rad] or [m]: runs that differ by more have nothing in common
-_MIN_HORIZON = 1e-3  # of the duration
+_MIN_HORIZON = 1e-3  # fraction of the duration
 _ULPS = 4.0  # smallest error of a reference, in units of rounding of the largest position
 _FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-12, 1e-14))
 _SECOND = ("GaussLegendre6", "Rodas5PFixed")
-_REFERENCE_FRACTION, _MIN_LIMIT_S = 0.08, 0.5  # of the budget, for one reference run, with a lower limit in [s]
-_RUN_FRACTION = 0.02  # of the budget, for one run past the horizon
+_REFERENCE_FRACTION, _MIN_LIMIT_S = 0.08, 0.5  # fraction of the budget for one reference run, with a lower limit in [s]
+_RUN_FRACTION = 0.02  # fraction of the budget for one run past the horizon
 
 
 class HorizonError(RobotDynError):

@@ -21,7 +21,7 @@ from typing import Any
 from robot_dyn.description import catalog
 from robot_dyn.foundations.errors import DescriptionError, RobotDynError, nearest, shorten, shown
 
-SECONDS = 60  # of an expansion
+SECONDS = 60  # time limit of an expansion
 MEMORY = 2 << 30  # bytes
 _UNDEFINED = re.compile(r"Undefined substitution argument (\w+)")
 

@@ -32,7 +32,7 @@ class Fastest:
 
     Attributes:
         eigenvalue: λ, in [1/s].
-        joint: Name of the joint that takes part most.
+        joint: Name of the joint with the largest part in the motion.
         source: Name of the effect or control with the largest |λ_k|; BODIES if the rigid bodies contribute most.
     """
 
