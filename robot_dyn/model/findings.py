@@ -202,20 +202,26 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
         name: x[ARMATURE] for name, x in stated.items() if x.get(ARMATURE) and name not in dict(robot.edits.armature)
     }
     stiffness = {name: x[STIFFNESS] for name, x in stated.items() if x.get(STIFFNESS)}
-    for numbers, what, remedy in (
+    for numbers, what, units, remedy in (
         (
             armature,
-            "a reflected rotor inertia of {} kg m² (kg if prismatic), which M does not contain",
+            "a reflected rotor inertia of {}, which M does not contain",
+            ("kg m²", "kg"),
             'with_(armature="urdf") adds it',
         ),
         (
             stiffness,
-            "a spring of {} N m/rad (N/m if prismatic), which does not act",
+            "a spring of {}, which does not act",
+            ("N m/rad", "N/m"),
             'the effect Spring("urdf", rest="urdf") adds it',
         ),
     ):
         if numbers:
-            largest = f"{'up to ' if len(numbers) > 1 else ''}{max(numbers.values()):.3g}"
+            by_unit: dict[str, list[float]] = {}
+            for name, value in numbers.items():
+                by_unit.setdefault(units[robot.joints[name].kind == "prismatic"], []).append(value)
+            largest = " and ".join(f"{max(values):.3g} {unit}" for unit, values in by_unit.items())
+            largest = f"{'up to ' if len(numbers) > 1 else ''}{largest}"
             yield f"{_joints(numbers)}: the file states, for other programs only, {what.format(largest)}; {remedy}"
 
 
