@@ -202,7 +202,7 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
         name: x[ARMATURE] for name, x in stated.items() if x.get(ARMATURE) and name not in dict(robot.edits.armature)
     }
     stiffness = {name: x[STIFFNESS] for name, x in stated.items() if x.get(STIFFNESS)}
-    for numbers, what, (of_turn, of_slide), remedy in (
+    for numbers, what, units, remedy in (
         (
             armature,
             "a reflected rotor inertia of {}, which M does not contain",
@@ -217,9 +217,11 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
         ),
     ):
         if numbers:
-            worst = max(numbers, key=lambda name: numbers[name])
-            unit = of_slide if robot.joints[worst].kind == "prismatic" else of_turn
-            largest = f"{'up to ' if len(numbers) > 1 else ''}{numbers[worst]:.3g} {unit}"
+            by_unit: dict[str, list[float]] = {}
+            for name, value in numbers.items():
+                by_unit.setdefault(units[robot.joints[name].kind == "prismatic"], []).append(value)
+            largest = " and ".join(f"{max(values):.3g} {unit}" for unit, values in by_unit.items())
+            largest = f"{'up to ' if len(numbers) > 1 else ''}{largest}"
             yield f"{_joints(numbers)}: the file states, for other programs only, {what.format(largest)}; {remedy}"
 
 

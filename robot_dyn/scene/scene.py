@@ -224,7 +224,9 @@ def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        raise SceneError(f"{path}: is not UTF-8 text; save it as TOML in UTF-8") from None
+        raise SceneError(
+            f"{path}: is not UTF-8 text; a scene is a TOML file in UTF-8: `robot-dyn scene` prints one"
+        ) from None
     scene = parse_scene(text, str(path), effects)
     try:
         return scene, scene.setup(Path(path).parent, {"scene": text})

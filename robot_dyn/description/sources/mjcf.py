@@ -74,7 +74,9 @@ def leavable(without: Iterable[str]) -> frozenset[str]:
         DescriptionError: If it is not several of `LEAVABLE`.
     """
     if not isinstance(without, set | frozenset | tuple | list) or not all(kind in LEAVABLE for kind in without):
-        raise DescriptionError(f"without must be a set of {', '.join(LEAVABLE)}, got {shown(without)}")
+        unknown = [kind for kind in without if kind not in LEAVABLE] if isinstance(without, set | frozenset) else []
+        names = ", ".join(sorted(map(shown, unknown))) or shown(without)
+        raise DescriptionError(f"without must be a set of {', '.join(LEAVABLE)}, got {names}")
     return frozenset(without)
 
 

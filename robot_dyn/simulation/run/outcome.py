@@ -130,7 +130,7 @@ class Outcome:
     Attributes:
         reason: The reason by name.
         t: Time of the end, in [s].
-        joint: Name of the joint it concerns: the fastest, or that with most part in the motion; empty if none.
+        joint: Name of the joint it concerns: the fastest, or the one that takes part most in the motion; empty if none.
         facts: Numbers and names that explain it, by name; see `outcome.py` for those of each reason.
     """
 

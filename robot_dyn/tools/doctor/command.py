@@ -74,9 +74,10 @@ def check_urdf(
     document = {"files": [{"file": file, "written": to} | plain(checkup) for file, checkup, to in checked]}
     show([line for result in checked for line in _lines(*result, all_)], as_json=as_json, document=document)
     if fix and not as_json:
-        for file in files:
+        for file, checkup in zip(files, checkups, strict=True):
             if file not in written:
-                to_stderr(f"{file}: nothing to repair")
+                hint = "; --units also converts suspected wrong units" if checkup.findings and not units else ""
+                to_stderr(f"{file}: nothing to repair{hint}")
     remaining = (finding for file, x, _ in checked for finding in (x.left if file in written else x.findings))
     if any(finding.severity is Severity.ERROR for finding in remaining):
         raise typer.Exit(1)

@@ -167,7 +167,8 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
     assert small["shoulder_lift_joint"][0] == "peak" and not found.fits
     assert all(kinds[-1] == "speed" for kinds in small.values() if "speed" in kinds)
     lift = found.joints[1]
-    assert f"shoulder_lift_joint needs {lift.peak:.4g} of 60 N m" in found.sentence and "for gravity" in found.sentence
+    assert f"shoulder_lift_joint needs {lift.peak:.4g} N m (limit 60)" in found.sentence
+    assert "for gravity" in found.sentence
     assert any("the peak torque limit of shoulder_pan_joint" in each for each in found.findings)
     free = budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
     assert free.fits and "no limit is known" in free.sentence

@@ -90,13 +90,13 @@ class JointBudget:
         """Return demand and limit of a kind in words, with the largest cause."""
         unit = of_joint("rad/s" if kind == "speed" else "N m", self.type)
         if kind == "continuous":
-            return f"{self.rms:.4g} of {self.continuous_limit:.4g} {unit} rms{_most(self.of_rms)}"
+            return f"{self.rms:.4g} {unit} rms (limit {self.continuous_limit:.4g}){_most(self.of_rms)}"
         if kind == "speed":
-            return f"{self.speed:.4g} of {self.speed_limit:.4g} {unit} at {self.speed_at_s:.4g} s"
+            return f"{self.speed:.4g} {unit} (limit {self.speed_limit:.4g}) at {self.speed_at_s:.4g} s"
         starts = self.breakaway > self.peak
         need, at = (self.breakaway, self.breakaway_at_s) if starts else (self.peak, self.peak_at_s)
         more = " to break away" if starts else ", where it was cut" if self.cut else ""
-        return f"{need:.4g} of {self.peak_limit:.4g} {unit} at {at:.4g} s{more or _most(self.of_peak)}"
+        return f"{need:.4g} {unit} (limit {self.peak_limit:.4g}) at {at:.4g} s{more or _most(self.of_peak)}"
 
 
 def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozenset()) -> Iterator[JointBudget]:
