@@ -10,6 +10,7 @@ from robot_dyn.description.inertia import implausibility as implausibility
 from robot_dyn.description.inertial_parameters import parameter_names as parameter_names
 from robot_dyn.description.inertial_parameters import parameters as parameters
 from robot_dyn.description.inertial_parameters import unit_inertias as unit_inertias
+from robot_dyn.description.markup import declared_first as declared_first
 from robot_dyn.description.markup import parse as parse
 from robot_dyn.description.packages import package_folders as package_folders
 from robot_dyn.description.packages import searched as searched

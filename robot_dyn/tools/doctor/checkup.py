@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
-
 from robot_dyn import Robot
 from robot_dyn.description import catalog, description, searched
 from robot_dyn.foundations import UNREPORTED, Answer, Block, DescriptionError, QueryError, reported, truth
@@ -47,8 +45,8 @@ class Checkup(Answer):
         source: Path of the file.
         loads: True if the file can be loaded without repairs; otherwise a finding gives the reason.
         findings: All findings, most severe first.
-        repaired: The file with all repairs, each change in a comment before its element; repairing it again changes
-            nothing. None if the file is not XML, or nothing can be repaired.
+        repaired: The file with all repairs; everything else in it is unchanged, and repairing it again changes nothing.
+            None if the file is not XML, or nothing can be repaired.
         left: Findings in the repaired file, with its lines; `findings` if there is no repaired file.
         gone: Findings that the repaired file no longer has.
         examined: True if masses, inertias and shapes were checked, which requires a file that loads, possibly after
@@ -284,7 +282,7 @@ def _of_mesh(note: str) -> Finding:
 
 
 def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
-    """Return the document with all changes, each in a comment before its element.
+    """Return the document with all changes.
 
     If two findings change the same attribute, only the first is repaired; the next round checks the rest.
     """
@@ -295,20 +293,5 @@ def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
             continue
         changed |= places
         for change in finding.changes:
-            comment = etree.Comment(f" robot-dyn check-urdf: {_plain(f'{change.text}: {finding.what}')} ")
-            comment.tail = _indent(change.element)
             change.apply()
-            change.element.addprevious(comment)
-    return document.mended()
-
-
-def _plain(text: str) -> str:
-    """Return a text that is valid in an XML comment."""
-    return " ".join(text.split()).replace("--", "- -").rstrip("-")
-
-
-def _indent(element: etree._Element) -> str:
-    """Return the whitespace before an element."""
-    before = element.getprevious()
-    text = element.getparent().text if before is None else before.tail
-    return "\n" + (text or "").rpartition("\n")[2] if "\n" in (text or "") else " "
+    return document.mended(changed)
