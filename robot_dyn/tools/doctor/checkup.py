@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 from robot_dyn import Robot
-from robot_dyn.description import catalog, description, searched
+from robot_dyn.description import catalog, description, parse, searched
 from robot_dyn.foundations import UNREPORTED, Answer, Block, DescriptionError, QueryError, reported, truth
 from robot_dyn.shapes import Masses
 from robot_dyn.tools.doctor import (
@@ -27,6 +27,9 @@ from robot_dyn.tools.doctor import (
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.estimate import missing_inertials
 from robot_dyn.tools.doctor.finding import Finding, Severity
+
+if TYPE_CHECKING:
+    from robot_dyn.description.sources.xacro import Expansion
 
 _OF_TEXT = (
     spelling.misspelt, literals.decimal_commas, literals.line_breaks, literals.angles_in_degrees,
@@ -101,7 +104,7 @@ def check_urdf(
         density: Density in [kg/m³] for the same repairs, instead of total_mass.
         allow_overlap: With masses: accept meshes whose closed parts overlap, as in `load`.
         units: Convert masses, inertias and shapes from suspected wrong units. Invented numbers can look like these.
-        xacro: Expand the file by xacro first, as `load` does; findings are those of the expanded text, without lines.
+        xacro: Expand the file by xacro first, as `load` does; findings name its lines and macro calls.
 
     Raises:
         CatalogError: If there is no such file, or an entry of `package_dirs` is not a folder.
@@ -118,8 +121,8 @@ def check_urdf(
     if xacro is not None:
         from robot_dyn.description import expand
 
-        text, warned = expand(path, xacro, package_dirs)
-        return _without_lines(checked(text, str(path), package_dirs, estimates, units), map(_assumed, warned))
+        expansion = expand(path, xacro, package_dirs)
+        return _of_xacro(checked(expansion.text, str(path), package_dirs, estimates, units), expansion)
     try:
         description.refuse_xacro(path)
     except DescriptionError as error:
@@ -196,6 +199,7 @@ def _examined(
         if conversions := [finding for finding in findings if finding.changes and finding.supposed and units]:
             document = _rewritten(document, conversions)
     loads = refusal is None and not any(finding.kind == "refused" for finding in findings)
+    findings = [x if x.line else replace(x, line=written.line(x.where, x.what)) for x in findings]
     repaired = None if document is written or document.text == text else document.text
     return _Examined(loads, _gravest_first(findings), repaired, robot is not None, estimated)
 
@@ -221,17 +225,28 @@ def _refused(source: str, error: DescriptionError) -> Checkup:
     return Checkup(source, False, findings, None, findings)
 
 
-def _without_lines(checkup: Checkup, more: Iterable[Finding]) -> Checkup:
-    """Return the checkup of an expanded text without lines, because they are not the file's, with xacro's warnings.
+def _of_xacro(checkup: Checkup, expansion: Expansion) -> Checkup:
+    """Return the checkup of an expanded text with the places of the xacro file, and with xacro's warnings.
 
     The warnings concern the xacro file: a check of the repaired file does not repeat them.
     """
-    more = tuple(more)
-    findings = [replace(finding, line=None) for finding in checkup.findings]
-    gone = [replace(finding, line=None) for finding in checkup.gone]
-    findings = _gravest_first((*findings, *more))
+    try:
+        elements = parse(expansion.text, checkup.source)[0].iter("*")
+    except DescriptionError:
+        elements = ()
+    places = dict(zip((element.sourceline for element in elements), expansion.places, strict=False))
+
+    def placed(finding: Finding) -> Finding:
+        where, _, line = finding.where.rpartition("line ")
+        if not line.isdecimal():
+            return replace(finding, line=None, expanded_from=places.get(finding.line, ""))
+        return replace(
+            finding, where=where.removesuffix(" in ") or "file", line=None, expanded_from=places.get(int(line), "")
+        )
+
+    findings = _gravest_first((*map(placed, checkup.findings), *map(_assumed, expansion.warnings)))
     left = findings if checkup.repaired is None else checkup.left
-    return replace(checkup, findings=findings, left=left, gone=tuple(gone))
+    return replace(checkup, findings=findings, left=left, gone=tuple(map(placed, checkup.gone)))
 
 
 def _refusal(text: bytes, source: str) -> DescriptionError | None:

@@ -90,10 +90,10 @@ def test_of_a_file_of_the_catalog_only_lines_with_repairs_change(name: str) -> N
         pytest.skip("no mass with a decimal point")
     place = places[np.random.default_rng(1).integers(len(places))]
     broken = text[: place.start(1)] + place[1].replace(b".", b",") + text[place.end(1) :]
-    checkup = checked(broken, str(path))
+    checkup = checked(broken, "rig.urdf")  # without its meshes
     assert checkup.repaired is not None
     assert "decimal_comma" not in {finding.kind for finding in checkup.left}
     lines = zip(broken.split(b"\n"), checkup.repaired.split(b"\n"), strict=True)
     changed = {number for number, (old, new) in enumerate(lines, start=1) if old != new}
-    assert broken.count(b"\n", 0, place.start()) + 1 in changed
+    assert broken.count(b"\n", 0, place.start(1)) + 1 in changed
     assert changed <= {finding.line for finding in checkup.findings if finding.changes}
