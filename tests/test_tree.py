@@ -96,6 +96,7 @@ EXCEPTIONS = {
     ("proof", "robot_dyn.codegen.trace.condition"): "functions of users are traced on nodes with conditions",
     ("proof", "robot_dyn.codegen.trace.origins"): "the equation of a proof has the fewest terms",
     ("sweeps", "robot_dyn.simulation.rollouts.batch"): "a sweep records as much of a batch as its figures need",
+    ("sweeps", "robot_dyn.simulation.rollouts.comparison"): "uncut sweeps are compared as uncut rollouts are",
     ("sweeps", "robot_dyn.simulation.rollouts.lock_step"): "chunks are multiples of the runs of one lock step",
     ("sweeps", "robot_dyn.simulation.rollouts.overview"): "a row holds the remarks on its run",
     ("sweeps", "robot_dyn.simulation.rollouts.rollouts"): "a sweep runs batches from rows of its design",

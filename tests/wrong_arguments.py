@@ -275,7 +275,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
         call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
         call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
-            record=("q",), cuts=True, numbers=[3, 1], threads=1, max_bytes=10**9),
+            record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),

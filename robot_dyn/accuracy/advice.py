@@ -15,7 +15,6 @@ from math import exp, inf, isfinite
 from typing import Unpack, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
@@ -23,6 +22,7 @@ from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError, RobotDynError, escaped
 from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.foundations.validate import JointValues
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
@@ -179,8 +179,8 @@ class Advice(Answer):
 @takes_options
 def advise(
     what: Setup | Plant | Dynamics,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     **options: Unpack[Options],
 ) -> Advice:
     """Report whether the step and the control period of a setup are short enough, and estimate the error.

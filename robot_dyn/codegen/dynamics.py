@@ -10,21 +10,24 @@ from typing import Any
 
 import numpy as np
 from numpy import empty
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import DTypeLike
 
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
 from robot_dyn.codegen.self_check import SelfCheck
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.threads import thread_count
-from robot_dyn.codegen.trace.trace import QUANTITIES, Trace
+from robot_dyn.codegen.trace.trace import QUANTITIES, Trace, keyed
 from robot_dyn.description.inertial_parameters import Parametrised
-from robot_dyn.foundations.validate import choice, instance, truth
+from robot_dyn.foundations.validate import JointValues, choice, instance, truth
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.right_angles import RightAngle, completed
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Dynamics, NanRows
+from robot_dyn.queries.batch import into
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Axes, Dynamics, NanRows
+from robot_dyn.queries.quantity import Key
 
+_FEW = 8  # states; a query of a frame at fewer is left to Pinocchio
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
 
@@ -32,7 +35,7 @@ class _Derivatives(Dynamics[np.ndarray]):
     """Queries with the derivatives of forward dynamics."""
 
     def forward_dynamics_derivatives(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
+        self, q: JointValues, v: JointValues, tau: JointValues
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return ∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
         three = self._answer(_DERIVATIVES, (q, v, tau), None)
@@ -47,6 +50,8 @@ class CompiledNanRows(_Derivatives, NanRows[np.ndarray]):
 @dataclass(frozen=True)
 class CompiledDynamics(_Derivatives, Parametrised):
     """A robot as machine code; each quantity is compiled on first use and checked against Pinocchio.
+
+    Placements and Jacobians of a frame are compiled for batches; those of up to eight states are computed by Pinocchio.
 
     Attributes:
         original: Robot passed by the user.
@@ -87,12 +92,12 @@ class CompiledDynamics(_Derivatives, Parametrised):
     def engine(self) -> Engine:
         """Kernels of the robot."""
 
-        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
-            return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
+        def truth(quantity: Key, state: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
+            return np.asarray(self._otherwise(quantity)(*(state[name] for name in keyed(quantity).arguments))), 0.0
 
         return Engine(
             Trace(self.robot).quantity,
-            QUANTITIES,
+            OnFirstUse(keyed),
             SelfCheck(self.robot, "Pinocchio"),
             truth,
             self.dtype,
@@ -151,17 +156,27 @@ class CompiledDynamics(_Derivatives, Parametrised):
         self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
     ) -> Any:
         if frame:
-            return self.robot._answer(name, state, out, frame, nan=nan)
+            return self._of_frame(name, state, out, frame, nan)
         if shape := self._shapes[name]:
             y = empty(shape, self._vector[1]) if out is None else out
             if not self._ones[name](*state, y):
                 return y
         return self.engine.ask(name, state, out, nan, self._otherwise(name))
 
+    def _of_frame(self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...], nan: bool) -> Any:
+        """Return a query of a frame: a batch by machine code, otherwise by Pinocchio."""
+        largest = max(x.size if isinstance(x, np.ndarray) else 0 for x in state)
+        if largest <= _FEW * self.n or not isinstance(frame[0], str):
+            answer = self.robot._answer(name, state, None, frame, nan=nan)
+            return into(out, np.asarray(answer, self.dtype))
+        link = self.robot.description.joint_frames.get(frame[0], frame[0])
+        key = name, link, *map(str, map(Axes.of, frame[1:]))
+        return self.engine.ask(key, state, out, nan, self._otherwise(key))
+
     # --- queries that take half a microsecond and skip `_answer`
 
     def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: np.ndarray | None = None
+        self, q: JointValues, v: JointValues, a: JointValues, *, out: np.ndarray | None = None
     ) -> np.ndarray:
         y = empty(*self._vector) if out is None else out
         if not self._ones["inverse_dynamics"](q, v, a, y):
@@ -169,15 +184,17 @@ class CompiledDynamics(_Derivatives, Parametrised):
         return self._answer("inverse_dynamics", (q, v, a), out)
 
     def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: np.ndarray | None = None
+        self, q: JointValues, v: JointValues, tau: JointValues, *, out: np.ndarray | None = None
     ) -> np.ndarray:
         y = empty(*self._vector) if out is None else out
         if not self._ones["forward_dynamics"](q, v, tau, y):
             return y
         return self._answer("forward_dynamics", (q, v, tau), out)
 
-    def _otherwise(self, quantity: str) -> Callable[..., Any]:
+    def _otherwise(self, quantity: Key) -> Callable[..., Any]:
         """Return Pinocchio's method for a quantity."""
+        if isinstance(quantity, tuple):
+            return lambda *state: self.robot._answer(quantity[0], state, None, quantity[1:])
         if quantity == _DERIVATIVES:
             return partial(forward_dynamics_derivatives, self.robot)
         return getattr(self.robot, quantity)

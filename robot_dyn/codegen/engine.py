@@ -26,7 +26,7 @@ from robot_dyn.foundations.validate import converted, shaped, times
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.foundations.waiting import log_if_slow
 from robot_dyn.queries.batch import DoubtError, answered, into
-from robot_dyn.queries.quantity import Quantity
+from robot_dyn.queries.quantity import Key, Quantity, title
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time is proportional to the count: 15 s at this limit.
@@ -45,7 +45,7 @@ class Engine:
 
     Attributes:
         traced: Function that returns the trace of a quantity.
-        quantities: Quantities that it computes, by name.
+        quantities: Quantities that it computes, by name, or by (name, link, …) for those of a frame.
         self_check: Check of new kernels; its robot defines the joints and the shapes.
         truth: Function that returns the independent result, (quantity, states) → (STATES, …), and the torque of
             effects.
@@ -60,10 +60,10 @@ class Engine:
             compiled, its kernel, and the checked functions for one state and for batches.
     """
 
-    traced: Callable[[str], Traced]
-    quantities: Mapping[str, Quantity]
+    traced: Callable[[Key], Traced]
+    quantities: Mapping[Key, Quantity]
     self_check: SelfCheck
-    truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray | float]]
+    truth: Callable[[Key, dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray | float]]
     dtype: str
     threads: int
     store: Store | None
@@ -96,23 +96,24 @@ class Engine:
     def instructions(self) -> dict[str, dict[str, int]]:
         """Number of instructions of each quantity used so far, by formulation; the first, shortest one is compiled."""
         return {
-            name: dict(sorted(trace.counts.items(), key=lambda item: item[1])) for name, trace in self.traces.items()
+            title(name): dict(sorted(trace.counts.items(), key=lambda item: item[1]))
+            for name, trace in self.traces.items()
         }
 
-    def shape(self, quantity: str) -> tuple[int, ...]:
+    def shape(self, quantity: Key) -> tuple[int, ...]:
         """Return the shape of a quantity for one state, (1,) for a number."""
         return self.quantities[quantity].shape(self.sizes) or (1,)
 
-    def _is_worthwhile(self, quantity: str) -> bool:
+    def _is_worthwhile(self, quantity: Key) -> bool:
         """Return True if a quantity is short enough to be compiled; issue a SizeWarning otherwise."""
         if self.singular and self.quantities[quantity].solves:
             return False
-        with log_if_slow(f"tracing {quantity} of {self.self_check.dynamics.name}"):
+        with log_if_slow(f"tracing {title(quantity)} of {self.self_check.dynamics.name}"):
             trace = self.traces[quantity]
         if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
             return True
         warnings.warn(
-            f"{quantity} needs {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
+            f"{title(quantity)} needs {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
             f" {self.self_check.name} computes it, which is slower",
             SizeWarning,
             stacklevel=2,
@@ -121,7 +122,7 @@ class Engine:
 
     def ask(
         self,
-        quantity: str,
+        quantity: Key,
         arguments: tuple[ArrayLike, ...],
         out: np.ndarray | None,
         nan: bool,
@@ -157,7 +158,7 @@ class Engine:
         answer = answered(equation, arrays, shape, self.joint_names, nan, Float(np.dtype(self.dtype)))
         return into(out, answer if requested.axes else answer[..., 0][()])
 
-    def _computed(self, quantity: str, arguments: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
+    def _computed(self, quantity: Key, arguments: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
         """Return the kernel's results for a batch of states, or None if it reports doubt."""
         flat = [
             np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1])), self.dtype).reshape(-1, x.shape[-1])
@@ -166,7 +167,7 @@ class Engine:
         y = np.empty((*batch, *self.shape(quantity)), self.dtype)
         return y if self._run(quantity, flat, y.reshape(len(flat[0]), -1)) is Status.FINE else None
 
-    def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> np.ndarray | None:
+    def _plainly(self, quantity: Key, arguments: tuple[Any, ...], out: np.ndarray | None) -> np.ndarray | None:
         """Return the result for plain arrays (B, n) if the kernel reports no doubt; otherwise None."""
         requested, states = self.quantities[quantity], getattr(arguments[-1], "shape", ())[:-1]
         if len(states) != 1 or states[0] <= _FEW or not requested.axes:
@@ -200,7 +201,7 @@ class Engine:
             return x
         return shaped(name, x, self.joint_names)
 
-    def _run(self, quantity: str, inputs: list[np.ndarray], y: np.ndarray) -> Status:
+    def _run(self, quantity: Key, inputs: list[np.ndarray], y: np.ndarray) -> Status:
         if len(y) > _FEW:
             return self.many[quantity](inputs, y, self.threads)
         timed = self.kernels[quantity].times
@@ -208,18 +209,18 @@ class Engine:
         rows = [[float(x[i, 0]) if timed and j == 0 else x[i] for j, x in enumerate(inputs)] for i in range(len(y))]
         return max(self._single(quantity, *row, results[i]) for i, row in enumerate(rows))
 
-    def _single(self, quantity: str, *arguments: Any) -> Status:
+    def _single(self, quantity: Key, *arguments: Any) -> Status:
         status = Status(self.ones[quantity](*arguments))
         if status is not Status.FAR or self.coupled:
             return status
         return Status(self.kernels[quantity].any_angle(*arguments))
 
-    def _kernel(self, quantity: str) -> Kernel:
+    def _kernel(self, quantity: Key) -> Kernel:
         """Return the kernel of a quantity."""
         requested = self.quantities[quantity]
         times = requested.arguments[0] == "t"
         program = program_of(self.traces[quantity].function)
-        about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
+        about = f"{self.self_check.dynamics.name}: {title(quantity)}, {self.dtype}"
         return Kernel(
             program,
             self.shape(quantity),
@@ -232,7 +233,7 @@ class Engine:
             takes_any_angle=not self.coupled,
         )
 
-    def _one(self, quantity: str) -> Any:
+    def _one(self, quantity: Key) -> Any:
         """Return the checked kernel for one state."""
         if not self.worthwhile[quantity]:
             return _never
@@ -240,7 +241,7 @@ class Engine:
         self._judge(quantity, lambda inputs, y: [kernel.call(*row, y[i]) for i, row in enumerate(inputs)])
         return kernel.call
 
-    def _many(self, quantity: str) -> Any:
+    def _many(self, quantity: Key) -> Any:
         """Return the checked kernel for batches."""
         if not self.worthwhile[quantity]:
             return _never
@@ -254,15 +255,15 @@ class Engine:
         self._judge(quantity, run)
         return kernel.many
 
-    def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
+    def _judge(self, quantity: Key, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
         """Compare the result of `run`, which compiles the kernel, with the independent result.
 
         `run` returns one Status, or one for each state.
         """
-        with log_if_slow(f"compiling {quantity} of {self.self_check.dynamics.name}, once for these equations"):
+        with log_if_slow(f"compiling {title(quantity)} of {self.self_check.dynamics.name}, once for these equations"):
             self._compare(quantity, run)
 
-    def _compare(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
+    def _compare(self, quantity: Key, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
         requested = self.quantities[quantity]
         state = {name: x.astype(self.dtype).astype(float) for name, x in self.self_check.states().items()}
         rows = [

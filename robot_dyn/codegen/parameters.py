@@ -1,8 +1,8 @@
 """Parameters of a plant and its controller: values that are inputs p of machine code, not constants.
 
 They are coefficients of effects, gains, coefficients of references other than polynomials, gravity and payloads.
-Changing one requires no compilation, and each may differ between runs. Armature, the scale of all masses, and mass and
-inertia of a single link are inputs only if they are swept; lengths are constants of the code.
+Changing one requires no compilation, and each may differ between runs. Armature, the scale of all masses, and mass,
+inertia and scale of a single link are inputs only if they are swept; lengths are constants of the code.
 """
 
 from __future__ import annotations
@@ -32,7 +32,12 @@ ROBOT: Part = ("robot",)
 CONTROLLER: Part = ("controller",)
 _GRAVITY = Coefficient("m/s²", shapes=((3,),))
 _WHEN_SWEPT = {"armature": Coefficient("kg m²", least=0), "mass_scale": Coefficient(shapes=((),), above=0)}
-_OF_LINK = {"mass": Coefficient("kg", shapes=((),), above=0), "inertia": Coefficient("kg m²", shapes=((3, 3),))}
+_OF_LINK = {
+    "mass": Coefficient("kg", shapes=((),), above=0),
+    "inertia": Coefficient("kg m²", shapes=((3, 3),)),
+    "mass_scale": Coefficient(shapes=((),), above=0),
+}
+_EDIT_OF = {"mass": "masses", "inertia": "inertias", "mass_scale": "mass_scales"}
 _PAYLOAD = {
     "mass": Coefficient("kg", shapes=((),), least=0),
     "com": Coefficient("m", shapes=((3,),)),
@@ -97,7 +102,8 @@ def parameters(
     does not matter, and its sine is not computed.
     """
     n = dynamics.n
-    result = [*_of_robot(dynamics, ROBOT, "", swept)]
+    models = {f"{_named(name)}.mass_scale" for name in (controller.models if controller else ())}
+    result = [*_of_robot(dynamics, ROBOT, "", {*swept} - models)]  # not of a link called "model"
     effects = tuple(effects)
     for i, name in enumerate(names_of(effects)):
         result += _of_part(effects[i], ("effect", i), f"{name}.", n)
@@ -166,7 +172,7 @@ def names_of(effects: Sequence[Effect]) -> list[str]:
 
 
 def link_parameters(dynamics: Dynamics) -> tuple[str, ...]:
-    """Return the names of masses and inertias of all links, such as "panda_link3.mass": parameters if swept."""
+    """Return the names of masses, inertias and scales of all links, such as "panda_link3.mass": parameters if swept."""
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         return ()
@@ -184,12 +190,14 @@ def variable_parameters(
 
 
 def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
-    """Return the edited mass and inertia of each link that states them, by link."""
-    inertias = {}
-    for link in tree_of(robot.description, replace(robot.edits, payloads=(), mass_scale="1")).links:
+    """Return the edited mass, inertia and scale of each link that states them, by link."""
+    inertias, scales = {}, dict(robot.edits.mass_scales)
+    for link in tree_of(robot.description, replace(robot.edits, payloads=(), mass_scale="1", mass_scales=())).links:
         for body in link.inertials:
             xx, xy, xz, yy, yz, zz = map(float, body.moments)
-            inertias[link.name] = {"mass": float(body.mass), "inertia": [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]}
+            inertia = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+            scale = scales.get(link.name, 1.0)
+            inertias[link.name] = {"mass": float(body.mass), "inertia": inertia, "mass_scale": scale}
     return inertias
 
 
@@ -219,7 +227,7 @@ def joined(parameters: Iterable[Parameter]) -> np.ndarray:
 
 
 def described(robot: Described, values: Mapping[str, Scalar]) -> Numbered:
-    """Return a robot with other gravity, payloads, armature, mass scale, and masses and inertias of links."""
+    """Return a robot with other gravity, payloads, armature, mass scale, and masses, inertias and scales of links."""
     payloads = tuple(
         with_values(payload, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
         for i, payload in enumerate(robot.edits.payloads)
@@ -228,9 +236,9 @@ def described(robot: Described, values: Mapping[str, Scalar]) -> Numbered:
     if "armature" in values:
         drives = zip(robot.joint_names, _literal(values["armature"]), strict=True)
         edits["armature"] = tuple((dict(robot.edits.armature) | dict(drives)).items())
-    for key, edited in (("mass", robot.edits.masses), ("inertia", robot.edits.inertias)):
+    for key, edit in _EDIT_OF.items():
         own = {name.partition(" ")[2]: _literal(x) for name, x in values.items() if name.startswith(f"{key} ")}
-        edits[{"mass": "masses", "inertia": "inertias"}[key]] = tuple((dict(edited) | own).items())
+        edits[edit] = tuple((dict(getattr(robot.edits, edit)) | own).items())
     return Numbered(robot.description, replace(robot.edits, **edits), robot.joint_names)
 
 

@@ -30,6 +30,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import MissingTimeError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import PLANT, Dynamics
+from robot_dyn.queries.quantity import Key, Quantity, title
 
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
 
@@ -67,7 +68,8 @@ class CompiledPlant:
     def engine(self) -> Engine:
         """Kernels of the plant."""
 
-        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        def truth(key: Key, state: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+            quantity = title(key)
             rows = [[state[name][i] for name in PLANT[quantity].arguments] for i in range(len(state["t"]))]
             times = zip(state["t"], state["q"], state["v"], strict=True)
             effects = np.array(
@@ -78,7 +80,7 @@ class CompiledPlant:
 
         return Engine(
             self._traced,
-            PLANT,
+            dict[Key, Quantity](PLANT),
             SelfCheck(self.dynamics.robot, "the interpreted plant"),
             truth,
             self.dynamics.dtype,
@@ -223,8 +225,8 @@ class CompiledPlant:
         return symbolic_plant(self.plant, self._bodies, split(self._parameters, self._numbers[1]))
 
     @interrupts_later()
-    def _traced(self, quantity: str) -> Traced:
-        (t, ts), (q, qs), (v, vs), (u, us) = self._inputs
+    def _traced(self, key: Key) -> Traced:
+        quantity, ((t, ts), (q, qs), (v, vs), (u, us)) = title(key), self._inputs
         with Symbolic().scope():
             equation = self._symbolic.equation_of_motion
             torque = sum(equation.torques(ts[0], qs, vs), start=0 * vs)

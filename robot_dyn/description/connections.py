@@ -17,11 +17,14 @@ Refuse = Callable[[str, str], NoReturn]  # where and why
 def one_tree(links: list[str], robot: etree._Element, refuse: Refuse) -> None:
     """Refuse a robot without exactly one root, with two parents of a link, or with a cycle."""
     parent_of: dict[str, str] = {}
+    joint_of: dict[str, str] = {}
     for joint in robot.iterfind("joint"):
-        parent, child = joint.find("parent").get("link"), joint.find("child").get("link")
+        parent, child, name = joint.find("parent").get("link"), joint.find("child").get("link"), joint.get("name")
         if child in parent_of:
-            refuse(f"link {child!r}", f"has two parents, {parent_of[child]!r} and {parent!r}; remove one joint")
-        parent_of[child] = parent
+            both = f"{parent_of[child]!r} by joint {joint_of[child]!r} and {parent!r} by joint {name!r}"
+            remedy = "remove one of the joints; a <mimic> in the other can make one joint follow another"
+            refuse(f"link {child!r}", f"has two parents, {both}; {remedy}")
+        parent_of[child], joint_of[child] = parent, name
     roots = [link for link in links if link not in parent_of]
     if len(roots) > 1:
         listed = ", ".join(repr(root) for root in roots[:5])

@@ -63,6 +63,7 @@ class Changes(TypedDict, total=False):
     payload: Payload | Iterable[Payload]
     armature: CoefficientInput
     mass_scale: float
+    mass_scales: Mapping[str, float]
     masses: Mapping[str, float]
     inertias: Mapping[str, ArrayLike]
 
@@ -82,7 +83,9 @@ class Edits:
         payloads: Bodies fastened to links.
         armature: Inertia of the drives reflected to the joints, as pairs (name, value in [kg m²] or [kg]).
         mass_scale: Factor on the mass and inertia of all links, but not of payloads; for deliberately wrong models.
-        masses: Masses that replace those of the file, as pairs (link, value in [kg]).
+        mass_scales: Factors on the mass and inertia of single links, as pairs (link, factor): a body of the same shape
+            and another density. They multiply the values of the file or of the next two edits, and `mass_scale`.
+        masses: Masses that replace those of the file, as pairs (link, value in [kg]); moments of inertia stay.
         inertias: Inertias that replace those of the file, about the centre of mass along the axes of the link's
             inertial frame, as pairs (link, (3, 3) in [kg m²]).
     """
@@ -92,6 +95,7 @@ class Edits:
     payloads: tuple[Payload, ...] = ()
     armature: tuple[tuple[str, float], ...] = ()
     mass_scale: float = 1.0
+    mass_scales: tuple[tuple[str, float], ...] = ()
     masses: tuple[tuple[str, float], ...] = ()
     inertias: tuple[tuple[str, Matrix3], ...] = ()
 
@@ -124,12 +128,13 @@ class Edits:
             mass_scale = changes["mass_scale"]
             factor = float(_numbers("mass_scale", mass_scale, (), above=0))
             new = replace(new, mass_scale=factor)
-        if "masses" in changes:
-            masses = {
-                link: float(_numbers(f"mass of {link!r}", x, (), above=0))
-                for link, x in _by_link("masses", changes["masses"])
-            }
-            new = replace(new, masses=tuple((dict(new.masses) | masses).items()))
+        for key, what in (("mass_scales", "mass_scale"), ("masses", "mass")):
+            if key in changes:
+                values = {
+                    link: float(_numbers(f"{what} of {link!r}", x, (), above=0))
+                    for link, x in _by_link(key, changes[key])
+                }
+                new = replace(new, **{key: tuple((dict(getattr(new, key)) | values).items())})
         if "inertias" in changes:
             inertias = {link: _inertia(link, x) for link, x in _by_link("inertias", changes["inertias"])}
             new = replace(new, inertias=tuple((dict(new.inertias) | inertias).items()))

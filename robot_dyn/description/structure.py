@@ -166,6 +166,9 @@ def structure_of(description: Description, edits: Edits) -> Structure:
     for name in links.keys() & dict(edits.inertias):
         (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = dict(edits.inertias)[name]
         links[name] = replace(links[name], moments=(Ixx, Ixy, Ixz, Iyy, Iyz, Izz))
+    for name in links.keys() & dict(edits.mass_scales):
+        link, factor = links[name], dict(edits.mass_scales)[name]
+        links[name] = replace(link, mass=factor * link.mass, moments=tuple(factor * x for x in link.moments))
     joints = {joint.get("name"): _joint(joint) for joint in file.iterfind("joint")}
     return Structure(links, joints, stated_mimics(file), edits)
 

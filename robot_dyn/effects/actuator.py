@@ -114,6 +114,7 @@ def stated_efforts(dynamics: Dynamics) -> np.ndarray:
         listed = ", ".join(map(repr, names[:6])) + (", …" if len(names) > 6 else "")
         raise EffectError(
             f"the file states an effort limit of 0 for {listed}, so no controller could move these joints; give limits"
-            f" by joint, such as {{{names[0]!r}: 87.0}}: joints left out have none"
+            f" by joint, such as {{{names[0]!r}: 87.0}}, or {{{names[0]!r}: 0}} for a passive joint; joints left out"
+            " have none"
         )
     return robot.effort_limit

@@ -20,6 +20,7 @@ EDITED = {
     "payload": "a rigid body on a link, in M, C and N",
     "armature": "added to the diagonal of M",
     "mass_scale": "factor on mass and inertia of all links, payloads excepted",
+    "mass_scales": "factors on mass and inertia of single links, payloads excepted",
     "mass": "of a link, replaces the value in the file",
     "inertia": "of a link, replaces the value in the file",
 }
@@ -174,6 +175,7 @@ def edit_terms(edits: Edits) -> Iterator[Term]:
         "payload": [f"{x.mass:g} kg on {x.frame} at ({', '.join(f'{c:g}' for c in x.com)}) m" for x in edits.payloads],
         "armature": [f"{joint} {x:g}" for joint, x in edits.armature if x],
         "mass_scale": [f"{edits.mass_scale:g}"] if edits.mass_scale != 1 else [],
+        "mass_scales": [f"{link} {x:g}" for link, x in edits.mass_scales],
         "mass": [f"{link} {x:g} kg" for link, x in edits.masses],
         "inertia": [link for link, _ in edits.inertias],
     }

@@ -21,6 +21,7 @@ from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import EffectError, MissingTimeError, OverflowedError, QueryError, shown
+from robot_dyn.foundations.names_nearest import NamesNearest
 from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
 from robot_dyn.foundations.values import Caching, several
 from robot_dyn.queries.dynamics import Dynamics, NanRows
@@ -28,7 +29,7 @@ from robot_dyn.queries.dynamics import Dynamics, NanRows
 
 @final
 @dataclass(frozen=True)
-class Plant(Caching):
+class Plant(NamesNearest, Caching):
     """A `Dynamics` and the effects that act on it.
 
     Attributes:

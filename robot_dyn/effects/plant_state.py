@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
@@ -15,15 +15,12 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import UNREPORTED
-from robot_dyn.foundations.validate import instance, number, one_state
+from robot_dyn.foundations.validate import JointValues, instance, number, one_state
 from robot_dyn.foundations.values import Value, read_only
-from robot_dyn.model.info import no_torque
+from robot_dyn.model.remarks import degree_lines, gravity_lines, order_lines
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 @final
@@ -35,6 +32,7 @@ class PlantState(Answer, Value):
         robot: Name of the robot.
         gravity: Acceleration of free fall in base axes, in [m/s²].
         gravity_acts: True if gravity exerts a torque on a joint at some position.
+        remarks: Order of q if it is not that of the file, joints without a torque of gravity, angles like degrees.
         joints: Names of the n joints.
         types: Types of the joints, such as "revolute".
         q, v, a, tau: The state, (n,), in SI units.
@@ -49,6 +47,7 @@ class PlantState(Answer, Value):
     robot: str
     gravity: tuple[float, float, float]
     gravity_acts: bool
+    remarks: tuple[str, ...]
     joints: tuple[str, ...]
     types: tuple[str, ...]
     q: np.ndarray
@@ -84,9 +83,9 @@ class PlantState(Answer, Value):
             one_unit = name == "N" or force in ("N m", "N")
             rows = without_rounding(rows) if one_unit else rows  # together, so that M stays symmetric
             yield from (f"  {numbers_row(row)}  {joint}" for row, joint in zip(rows, self.joints, strict=True))
-        if not self.gravity_acts:
+        if self.remarks:
             yield ""
-            yield f"{no_torque(self.gravity)} without effects"
+            yield from self.remarks
         if self.held:
             yield ""
             yield f"held at rest [{force}]:"
@@ -99,10 +98,10 @@ class PlantState(Answer, Value):
 
 def plant_state(
     plant: Plant | Dynamics,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike | None = None,
-    tau: ArrayLike | None = None,
+    q: JointValues,
+    v: JointValues,
+    a: JointValues | None = None,
+    tau: JointValues | None = None,
     t: float | None = None,
 ) -> PlantState:
     """Evaluate a plant, or a robot, at a state: tau from a, or a and the joints held at rest from tau.
@@ -129,7 +128,12 @@ def plant_state(
     state = {"q": q, "v": v, "a": a, "tau": tau}
     terms = {"M": plant.M(q, t=t), "C": plant.C(q, v, t=t), "N": plant.N(q, v, t=t)}
     effects = dict(zip(numbered(*(force.name for force in plant.forces)), torques, strict=True))
+    remarks = (
+        *degree_lines(robot.joint_names, robot.joint_types, q, robot.lower, robot.upper),
+        *order_lines(robot.joint_names, robot.file_order),
+        *gravity_lines(robot.edits.gravity, robot.gravity_free, robot.n),
+    )
     return PlantState(
-        robot.name, robot.edits.gravity, robot.gravity_acts, robot.joint_names, robot.joint_types, **state, **terms,
-        effects=effects, held=held, plant=plant, of_tau=of_tau,
+        robot.name, robot.edits.gravity, robot.gravity_acts, remarks, robot.joint_names, robot.joint_types,
+        **state, **terms, effects=effects, held=held, plant=plant, of_tau=of_tau,
     )  # fmt: skip

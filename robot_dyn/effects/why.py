@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
@@ -15,15 +15,11 @@ from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.coefficients import declared, with_values
 from robot_dyn.foundations.display import bars
 from robot_dyn.foundations.errors import QueryError, nearest
-from robot_dyn.foundations.validate import instance
+from robot_dyn.foundations.validate import JointValues, instance
 from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_texts, unit, without_rounding
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
 
 _AT_REST = "dry friction and stops, at rest"
 _CAUSES: tuple[str, ...] = "inertia", "Coriolis", "gravity", "effect"
@@ -90,12 +86,12 @@ class Why(Answer):
 
 def why(
     plant: Plant | Dynamics,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike | None,
+    q: JointValues,
+    v: JointValues,
+    a: JointValues | None,
     joint: str,
     *,
-    tau: ArrayLike | None = None,
+    tau: JointValues | None = None,
     t: float | None = None,
 ) -> Why:
     """Split the torque of a joint by link and cause.

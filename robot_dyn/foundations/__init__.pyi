@@ -80,6 +80,7 @@ from robot_dyn.foundations.spatial import rotation as rotation
 from robot_dyn.foundations.spatial import rotation_rpy as rotation_rpy
 from robot_dyn.foundations.spatial import rpy_of as rpy_of
 from robot_dyn.foundations.spatial import spatial_inertia as spatial_inertia
+from robot_dyn.foundations.validate import JointValues as JointValues
 from robot_dyn.foundations.validate import choice as choice
 from robot_dyn.foundations.validate import duration as duration
 from robot_dyn.foundations.validate import function as function

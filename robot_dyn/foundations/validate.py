@@ -6,14 +6,15 @@ value. Time loops skip these checks.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import hypot, inf, isfinite
 from numbers import Real
 from operator import index
 from types import UnionType
-from typing import Protocol, SupportsIndex, TypeGuard, TypeVar, overload
+from typing import Protocol, SupportsIndex, TypeAlias, TypeGuard, TypeVar, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.errors import (
     MissingTimeError,
@@ -28,6 +29,8 @@ from robot_dyn.foundations.errors import (
 
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
+JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike]
+"""Numbers of each joint, (..., n); or by joint name, (...), where joints left out have 0."""
 Instance = TypeVar("Instance")
 Function = TypeVar("Function")
 LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
@@ -219,21 +222,37 @@ def shaped(
 
     Args:
         what: Name of the argument in messages.
-        values: The argument.
+        values: The argument: an array, or numbers by joint name, of shape (…); joints left out have 0.
         joint_names: Names of the n joints.
         arithmetic: An `Arithmetic`; float64 by default.
 
     Raises:
-        QueryError: If they are not real numbers, or have another shape.
+        QueryError: If they are not real numbers, have another shape, or a name is not that of a joint.
     """
     n = len(joint_names)
     try:
         array = real(values) if arithmetic is None or arithmetic.dtype.kind == "f" else arithmetic.asarray(values)
     except (TypeError, ValueError, OverflowError) as fault:
+        if isinstance(values, Mapping):
+            return shaped(what, _in_order(what, values, joint_names), joint_names, arithmetic)
         raise QueryError(f"{what} must be an array of {n} real numbers, got {fault}") from None
     if array.ndim == 0 or array.shape[-1] != n:
         raise QueryError(f"{what} must have shape ({n},) or (..., {n}), got {array.shape}")
     return array
+
+
+def _in_order(what: str, values: Mapping[str, object], joint_names: Sequence[str]) -> np.ndarray:
+    """Return numbers by joint name as an array, (..., n); 0 for joints left out."""
+    if not values:
+        raise QueryError(f"{what}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
+    for name in values:
+        if name not in joint_names:
+            raise QueryError(f"{what}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
+    try:
+        return np.stack(np.broadcast_arrays(*[np.asarray(values.get(name, 0.0)) for name in joint_names]), axis=-1)
+    except ValueError:
+        shapes = {name: np.shape(np.asarray(x)) for name, x in values.items()}
+        raise QueryError(f"{what}: numbers of all joints must have one shape, got {shapes}") from None
 
 
 def converted(

@@ -11,14 +11,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.description.description import Description
 from robot_dyn.description.inertial_parameters import NAMES as PARAMETERS
 from robot_dyn.description.inertial_parameters import Parametrised, parameters
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, arithmetic_of, in_arithmetic
 from robot_dyn.foundations.errors import QueryError, shown
-from robot_dyn.foundations.validate import shaped
+from robot_dyn.foundations.validate import JointValues, shaped
 from robot_dyn.lagrange.formulas import FORMULAS
 from robot_dyn.lagrange.linkage import Linkage, linkage_of
 from robot_dyn.lagrange.summand import mass_matrix_derivative, summands_of_bodies
@@ -90,7 +89,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
     def inertial_parameters(self) -> Array:  # pyright: ignore[reportIncompatibleMethodOverride]
         return np.concatenate([parameters(self.linkage.inertias[i]) for i in self.linkage.order])
 
-    def mass_matrix_derivative(self, q: ArrayLike) -> Array:
+    def mass_matrix_derivative(self, q: JointValues) -> Array:
         """Return ∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
         return self._evaluated(
             _MASS_MATRIX_DERIVATIVE, lambda at: mass_matrix_derivative(at, summands_of_bodies(at)), (q,), False

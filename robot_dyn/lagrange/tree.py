@@ -172,7 +172,9 @@ def _from_the_root(joint_of_child: dict[str, Joint]) -> tuple[str, list[Joint]]:
 def _loaded(link: Link, edits: Edits) -> Link:
     """Return the link with edited masses and with the payloads it carries."""
     mass, inertia = dict(edits.masses).get(link.name), dict(edits.inertias).get(link.name)
-    more = [replace(part, scale=edits.mass_scale) for part in link.inertials]
+    scale, factor = edits.mass_scale, dict(edits.mass_scales).get(link.name)
+    scale = scale if factor is None else scale * factor
+    more = [replace(part, scale=scale) for part in link.inertials]
     if mass is not None:
         more = [replace(part, mass=mass) for part in more]
     if inertia is not None:

@@ -202,20 +202,24 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
         name: x[ARMATURE] for name, x in stated.items() if x.get(ARMATURE) and name not in dict(robot.edits.armature)
     }
     stiffness = {name: x[STIFFNESS] for name, x in stated.items() if x.get(STIFFNESS)}
-    for numbers, what, remedy in (
+    for numbers, what, (of_turn, of_slide), remedy in (
         (
             armature,
-            "a reflected rotor inertia of {} kg m² (kg if prismatic), which M does not contain",
+            "a reflected rotor inertia of {}, which M does not contain",
+            ("kg m²", "kg"),
             'with_(armature="urdf") adds it',
         ),
         (
             stiffness,
-            "a spring of {} N m/rad (N/m if prismatic), which does not act",
+            "a spring of {}, which does not act",
+            ("N m/rad", "N/m"),
             'the effect Spring("urdf", rest="urdf") adds it',
         ),
     ):
         if numbers:
-            largest = f"{'up to ' if len(numbers) > 1 else ''}{max(numbers.values()):.3g}"
+            worst = max(numbers, key=lambda name: numbers[name])
+            unit = of_slide if robot.joints[worst].kind == "prismatic" else of_turn
+            largest = f"{'up to ' if len(numbers) > 1 else ''}{numbers[worst]:.3g} {unit}"
             yield f"{_joints(numbers)}: the file states, for other programs only, {what.format(largest)}; {remedy}"
 
 

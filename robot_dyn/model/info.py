@@ -13,6 +13,7 @@ from robot_dyn.description.edits import Edits, Payload
 from robot_dyn.description.other_programs import Statement, in_words
 from robot_dyn.description.structure import Structure
 from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.model.remarks import gravity_lines, order_lines
 
 _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature"
 
@@ -56,6 +57,8 @@ class Info(Answer):
         total_mass: Mass of all links, in [kg].
         gravity: Acceleration of free fall in base axes, in [m/s²].
         gravity_acts: True if gravity exerts a torque on a joint at some position.
+        gravity_free: Joints on which gravity exerts no torque at any position, as the robot is mounted.
+        file_order: Independent joints in the order of the file.
         joints: Independent joints, in the order of q.
         couplings: Joints that follow another one, as stated by the file.
         narrowed: Followers that reach their own limits before their joint reaches its own, by joint: they narrow
@@ -75,6 +78,8 @@ class Info(Answer):
     total_mass: float
     gravity: tuple[float, float, float]
     gravity_acts: bool
+    gravity_free: tuple[str, ...]
+    file_order: tuple[str, ...]
     joints: tuple[Joint, ...]
     couplings: tuple[Coupling, ...]
     narrowed: dict[str, tuple[str, ...]]
@@ -88,8 +93,8 @@ class Info(Answer):
     def blocks(self) -> Iterator[Block]:
         yield _heading(self.robot, self.n, self.total_mass, self.gravity)
         yield abbreviated(self.source)
-        if not self.gravity_acts:
-            yield no_torque(self.gravity)
+        yield from gravity_lines(self.gravity, self.gravity_free, self.n)
+        yield from order_lines(tuple(joint.name for joint in self.joints), self.file_order)
         yield Table(_HEADINGS, tuple(tuple(vars(joint).values()) for joint in self.joints), digits=4)
         yield "units: rad and N m for revolute joints, m and N for prismatic joints; —: not stated"
         for coupling in self.couplings:
@@ -122,6 +127,8 @@ def _edits(locked: Mapping[str, float], payloads: Iterable[Payload]) -> Iterator
 def _other_edits(edits: Edits) -> Iterator[str]:
     if edits.mass_scale != 1:
         yield f"mass_scale: {edits.mass_scale:g}"
+    if edits.mass_scales:
+        yield f"mass_scales: {', '.join(f'{link} {x:g}' for link, x in edits.mass_scales)}"
     for name, changed in (("armature", edits.armature), ("mass", edits.masses), ("inertia", edits.inertias)):
         if changed:
             yield f"{name} changed: {', '.join(key for key, _ in changed)}"
@@ -142,10 +149,3 @@ def narrowed(robot: Structure) -> Iterator[tuple[str, tuple[str, ...]]]:
     for joint, position in position_limits(robot).items():
         if names := (*position.narrowed_by, *speeds[joint].narrowed_by):
             yield joint, tuple(dict.fromkeys(names))
-
-
-def no_torque(gravity: tuple[float, float, float]) -> str:
-    """Return the remark on a robot on which gravity exerts no torque."""
-    if not any(gravity):
-        return "gravity is zero, so N(q) = 0"
-    return f"gravity {gravity} m/s² exerts no torque on any joint at any position, so N(q) = 0"

@@ -94,11 +94,11 @@ def build(description: Description, edits: Edits) -> Built:
 
 
 def state_edits(robot: etree._Element, edits: Edits) -> None:
-    """Replace masses and inertias of links in the file by those of the edits."""
+    """Replace masses and inertias of links in the file by those of the edits, and scale both by link."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     with_mass = [name for name, inertial in links.items() if inertial is not None]
-    for edit, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
-        for name in names:
+    for edit in ("mass_scales", "masses", "inertias"):
+        for name, _ in getattr(edits, edit):
             if name not in with_mass:
                 raise EditError(f"{edit}: no link {name!r} with a mass in the file; {nearest(name, with_mass)}")
     for name, mass in edits.masses:
@@ -106,6 +106,15 @@ def state_edits(robot: etree._Element, edits: Edits) -> None:
     for name, inertia in edits.inertias:
         for i, j in combinations_with_replacement(range(3), 2):
             links[name].find("inertia").set(f"i{'xyz'[i]}{'xyz'[j]}", repr(float(inertia[i][j])))
+    for name, factor in edits.mass_scales:
+        scale_inertial(links[name], factor)
+
+
+def scale_inertial(inertial: etree._Element, factor: float) -> None:
+    """Multiply the mass and the moments of an <inertial> of a checked file by a factor."""
+    for element in (inertial.find("mass"), inertial.find("inertia")):
+        for key, text in element.items():
+            element.set(key, repr(float(factor) * float(text)))
 
 
 def _unmark(model: pin.Model) -> None:

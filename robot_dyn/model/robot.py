@@ -47,7 +47,7 @@ from robot_dyn.foundations.errors import (
     RobotDynError,
     announce,
 )
-from robot_dyn.foundations.validate import function, instance, is_moderate, is_plain, is_state
+from robot_dyn.foundations.validate import JointValues, function, instance, is_moderate, is_plain, is_state
 from robot_dyn.foundations.values import Caching, OnFirstUse
 from robot_dyn.model.calls import Scratch
 from robot_dyn.model.conditioning import LEAST_DIGITS
@@ -55,8 +55,9 @@ from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.from_pinocchio import described
-from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, no_torque, robot_line
+from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, robot_line
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
+from robot_dyn.model.remarks import no_torque
 from robot_dyn.model.to_urdf import write_urdf
 from robot_dyn.queries.batch import into
 from robot_dyn.queries.dynamics import Dynamics
@@ -108,17 +109,19 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     # --- queries that take microseconds, with a fast path
 
-    def M(self, q: ArrayLike, *, out: ndarray | None = None) -> ndarray:
+    def M(self, q: JointValues, *, out: ndarray | None = None) -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
             return pin.crba(self.model, self._scratch.data, q)
         return self._answer("M", (q,), out)
 
-    def N(self, q: ArrayLike, *, out: ndarray | None = None) -> ndarray:
+    def N(self, q: JointValues, *, out: ndarray | None = None) -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
         return self._answer("N", (q,), out)
 
-    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: ndarray | None = None) -> ndarray:
+    def inverse_dynamics(
+        self, q: JointValues, v: JointValues, a: JointValues, *, out: ndarray | None = None
+    ) -> ndarray:
         shape = self._uncoupled_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
@@ -126,7 +129,9 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
                 return tau
         return self._answer("inverse_dynamics", (q, v, a), out)
 
-    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: ndarray | None = None) -> ndarray:
+    def forward_dynamics(
+        self, q: JointValues, v: JointValues, tau: JointValues, *, out: ndarray | None = None
+    ) -> ndarray:
         shape = self._regular_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
@@ -282,19 +287,29 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         """Doubtful values of the description and its edits, each with its remedy; see docs/reference/findings.md."""
         return findings_of(self.description, self.edits, self._evaluation.regularity)
 
-    @cached_property
+    @property
     def gravity_acts(self) -> bool:
         """True if gravity exerts a torque or force on a joint at some position."""
+        return len(self.gravity_free) < self.n
+
+    @cached_property
+    def gravity_free(self) -> tuple[str, ...]:
+        """Joints on which gravity exerts no torque or force at any position, as mounted: such as a vertical axis."""
         g = float(np.linalg.norm(self.edits.gravity))
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (_STATES, self.n))
         length = 1.0 + sum(float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements)
         length += max(float(np.linalg.norm(body.lever)) for body in self.model.inertias)
         try:
-            return bool(
-                np.abs(self._evaluation.answer("N", (q,), nan=False)).max() > _ROUNDING * self.total_mass * g * length
-            )
+            largest = np.abs(self._evaluation.answer("N", (q,), nan=False)).max(axis=0)
         except RobotDynError:  # overflows: far from zero
-            return True
+            return ()
+        free = largest <= _ROUNDING * self.total_mass * g * length
+        return tuple(name for name, is_free in zip(self.joint_names, free, strict=True) if is_free)
+
+    @cached_property
+    def file_order(self) -> tuple[str, ...]:
+        """Names of the n joints in the order of the file; `joint_names` has the order of q, from base to tips."""
+        return structure_of(self.description, self.edits).free
 
     def random_configuration(self, rng: np.random.Generator) -> ndarray:
         """Return a position within the joint limits, uniformly distributed.
@@ -357,8 +372,9 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         Args:
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
                 several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg], or
-                "urdf" for `stated_armature`; mass_scale; masses and inertias: values by link that replace the
-                file's, in [kg], and (3, 3) in [kg m²].
+                "urdf" for `stated_armature`; mass_scale: factor on mass and inertia of all links; mass_scales: the
+                same by link, for another density; masses and inertias: values by link that replace the file's, in [kg],
+                and (3, 3) in [kg m²], where masses alone leave the inertia as it is.
 
         Raises:
             EditError: If a name is unknown or a value is not allowed, or "urdf" is given and the file states none.
@@ -496,6 +512,8 @@ def info(robot: Robot) -> Info:
         total_mass=robot.total_mass,
         gravity=robot.edits.gravity,
         gravity_acts=robot.gravity_acts,
+        gravity_free=robot.gravity_free,
+        file_order=robot.file_order,
         joints=tuple(Joint(*row) for row in rows),
         couplings=tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
         narrowed=dict(narrowed(structure_of(robot.description, robot.edits))),

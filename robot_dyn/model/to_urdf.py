@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import warnings
 from copy import deepcopy
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import DescriptionError, ModelWarning
 from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.foundations.spatial import rotation, rotation_rpy, rpy_of
-from robot_dyn.model.pinocchio_model import state_edits
+from robot_dyn.model.pinocchio_model import scale_inertial, state_edits
 
 _URDF = FileKind("a URDF", ".urdf", b"<?xml")
 _DRAWN = ("visual", "collision")
@@ -50,9 +50,7 @@ def _urdf_text(description: Description, edits: Edits, lacking: list[str], folde
     out = description.element
     state_edits(out, edits)
     for inertial in out.iterfind("link/inertial") if edits.mass_scale != 1.0 else ():
-        for element in (inertial.find("mass"), inertial.find("inertia")):
-            for key, text in element.items():
-                element.set(key, repr(edits.mass_scale * float(text)))
+        scale_inertial(inertial, edits.mass_scale)
     _fix_locked(out, dict(edits.lock))
     for joint in out.iterfind("joint"):
         _restate(joint)
@@ -126,7 +124,8 @@ def _draw(out: Any, description: Description, folder: Path) -> None:
     source = Path(description.source)
     for element in out.iter("mesh", "texture") if source.is_file() else ():
         address = element.get("filename") or ""
-        if address and "://" not in address and not Path(address).is_absolute():
+        rooted = Path(address).is_absolute() or PureWindowsPath(address).drive or address.startswith("file:")
+        if address and "://" not in address and not rooted:
             element.set("filename", Path(os.path.relpath(source.absolute().parent / address, folder)).as_posix())
 
 

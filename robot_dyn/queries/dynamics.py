@@ -13,12 +13,12 @@ from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.arithmetic import Array, rounding
 from robot_dyn.foundations.errors import OverflowedError, SingularError, UndecidedError, shown
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.foundations.validate import choice
+from robot_dyn.foundations.names_nearest import NamesNearest
+from robot_dyn.foundations.validate import JointValues, choice
 from robot_dyn.queries.quantity import DOUBTFUL, Quantity, query, table
 
 T = TypeVar("T")
@@ -72,7 +72,7 @@ def _jacobian_rate_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.nd
     return np.vstack([np.tile(arm * v.sum() + arm @ v, (3, 1)), np.full((3, len(v)), v.sum())])
 
 
-class Dynamics(ABC, Generic[Answer]):
+class Dynamics(NamesNearest, ABC, Generic[Answer]):
     """Rigid bodies in gravity: M(q) a + C(q, v) v + N(q) = τ.
 
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
@@ -117,57 +117,59 @@ class Dynamics(ABC, Generic[Answer]):
         return NanRows(self)
 
     @query("n", "n", unit="kg m²", terms=lambda size, x: size.M, definite=True, digits=True)
-    def M(self, q: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def M(self, q: JointValues, *, out: Answer | None = None) -> Answer:
         """Mass matrix of the kinetic energy K = ½ vᵀ M v, symmetric positive definite."""
         return self._answer("M", (q,), out)
 
     @query("n", "n", unit="N m s/rad", terms=lambda size, x: size.C(x["v"]), digits=True)
-    def C(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def C(self, q: JointValues, v: JointValues, *, out: Answer | None = None) -> Answer:
         """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ."""
         return self._answer("C", (q, v), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.N, digits=True)
-    def N(self, q: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def N(self, q: JointValues, *, out: Answer | None = None) -> Answer:
         """Gravity torque ∂V/∂q: the torque that holds the robot at rest."""
         return self._answer("N", (q,), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.C(x["v"]) @ x["v"])
-    def coriolis_torque(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def coriolis_torque(self, q: JointValues, v: JointValues, *, out: Answer | None = None) -> Answer:
         """Coriolis and centrifugal torque C(q, v) v."""
         return self._answer("coriolis_torque", (q, v), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.C(x["v"]).T @ x["v"])
-    def coriolis_transpose(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def coriolis_transpose(self, q: JointValues, v: JointValues, *, out: Answer | None = None) -> Answer:
         """Cᵀ(q, v) v = ∂K/∂q, used by momentum observers: d(M v)/dt = τ + Cᵀ v − N."""
         return self._answer("coriolis_transpose", (q, v), out)
 
     @query("n", unit="N m", terms=lambda size, x: size.inverse_dynamics(x["v"], x["a"]), digits=True)
-    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def inverse_dynamics(self, q: JointValues, v: JointValues, a: JointValues, *, out: Answer | None = None) -> Answer:
         """Torque of an acceleration: τ = M a + C v + N."""
         return self._answer("inverse_dynamics", (q, v, a), out)
 
     @query("n", unit="rad/s²", terms=_solved_torque, solves=True, doubtful=DOUBTFUL, digits=True)
-    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def forward_dynamics(
+        self, q: JointValues, v: JointValues, tau: JointValues, *, out: Answer | None = None
+    ) -> Answer:
         """Acceleration of a torque: a = M⁻¹ (τ − C v − N)."""
         return self._answer("forward_dynamics", (q, v, tau), out)
 
     @query(unit="J", terms=lambda size, x: x["v"] @ size.M @ x["v"] / 2)
-    def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Any:
+    def kinetic_energy(self, q: JointValues, v: JointValues, *, out: Answer | None = None) -> Any:
         """Kinetic energy K = ½ vᵀ M v."""
         return self._answer("kinetic_energy", (q, v), out)
 
     @query(unit="J", terms=lambda size, x: size.V)
-    def potential_energy(self, q: ArrayLike, *, out: Answer | None = None) -> Any:
+    def potential_energy(self, q: JointValues, *, out: Answer | None = None) -> Any:
         """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the moving bodies, 0 at the origin of the base."""
         return self._answer("potential_energy", (q,), out)
 
     @query("n", unit="N m s", terms=lambda size, x: size.M @ x["v"])
-    def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def momentum(self, q: JointValues, v: JointValues, *, out: Answer | None = None) -> Answer:
         """Generalised momentum p = ∂K/∂v = M v."""
         return self._answer("momentum", (q, v), out)
 
     @query("n", "p", unit="N m by parameter", terms=lambda size, x: size.regressor(x["v"], x["a"]))
-    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None) -> Answer:
+    def regressor(self, q: JointValues, v: JointValues, a: JointValues, *, out: Answer | None = None) -> Answer:
         """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
 
         Y depends on geometry, gravity and couplings, but not on masses: θ can be identified from measured torques,
@@ -177,26 +179,26 @@ class Dynamics(ABC, Generic[Answer]):
         return self._answer("regressor", (q, v, a), out)
 
     @query(4, 4, unit="1 and m", terms=_placement_terms)
-    def placement(self, q: ArrayLike, frame: str, *, out: Answer | None = None) -> Answer:
+    def placement(self, q: JointValues, frame: str, *, out: Answer | None = None) -> Answer:
         """Placement of a frame in the base: the homogeneous matrix [[R, p], [0, 1]]."""
         return self._answer("placement", (q,), out, (frame,))
 
     @query(6, "n", unit="m/s and rad/s by v", terms=_jacobian_terms)
     def jacobian(
-        self, q: ArrayLike, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, out: Answer | None = None,
+        self, q: JointValues, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, out: Answer | None = None,
     ) -> Answer:  # fmt: skip
         """Jacobian J(q) of a frame: twist = J v, (linear, angular)."""
         return self._answer("jacobian", (q,), out, (frame, expressed_in))
 
     @query(6, "n", unit="m/s² and rad/s² by v", terms=_jacobian_rate_terms)
     def jacobian_rate(
-        self, q: ArrayLike, v: ArrayLike, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED,
+        self, q: JointValues, v: JointValues, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED,
         out: Answer | None = None,
     ) -> Answer:  # fmt: skip
         """Rate of change dJ/dt of the Jacobian of a frame, along v."""
         return self._answer("jacobian_rate", (q, v), out, (frame, expressed_in))
 
-    def total_energy(self, q: ArrayLike, v: ArrayLike) -> Any:
+    def total_energy(self, q: JointValues, v: JointValues) -> Any:
         """Return the total energy E = K + V, which is constant if only gravity acts.
 
         Args:

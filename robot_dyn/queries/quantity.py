@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import cleandoc, signature
 from math import inf
 from typing import Any, TypeVar, final
@@ -18,6 +18,7 @@ DOUBTFUL = 1e10  # ‖a‖ above which M may be singular at this q, hidden by ro
 MOST_DIGITS = 20  # maximum number of digits counted
 
 State = Mapping[str, Scalar]
+Key = str | tuple[str, ...]  # name of a query, or (name, link) or (name, link, axes) of a query of a frame
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 _PARAMETERS = {
@@ -87,6 +88,16 @@ class Quantity:
     def ask(self, engine: Any, state: State, *frame: str, **options: Any) -> Any:
         """Return the result of an engine at a state, with arguments by name."""
         return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame, **options)
+
+
+def of_frame(quantity: Quantity, link: str) -> Quantity:
+    """Return a quantity of one link, with the scale of its entries there."""
+    return replace(quantity, terms=lambda size, state: quantity.terms(size, state, link))
+
+
+def title(key: Key) -> str:
+    """Return the name of a query for messages, such as "jacobian of tool0, body"."""
+    return key if isinstance(key, str) else f"{key[0]} of {', '.join(key[1:])}"
 
 
 def query(*axes: int | str, unit: str, terms: Callable[..., Any], **properties: Any) -> Callable[[Method], Method]:

@@ -194,7 +194,18 @@ class Wrench(Acting):
         return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
 
 
-EDITS = Gravity, Lock, Load, Armature
+class MassScale(Edit):
+    """Factors on mass and inertia of single links: the same shape with another density; payloads excepted."""
+
+    kind: Literal["mass_scale"]
+    factors: dict[str, Positive]
+    """Factor by link. To change the mass alone, vary `LINK.mass`."""
+
+    def edit(self, robot: Robot, loaded: Robot) -> Robot:
+        return robot.with_(mass_scales=self.factors)
+
+
+EDITS = Gravity, Lock, Load, Armature, MassScale
 _JOINT_STOPS = declared_part(
     DeclaredEffect, "joint_stops", JointStopSpring, JointStopDamper, factory=joint_stops,
     text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",

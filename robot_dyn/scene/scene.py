@@ -27,6 +27,7 @@ from robot_dyn.scene.effects import ACTING, BY_KIND, EDITS, AnyEffect, DeclaredE
 from robot_dyn.scene.messages import line, named_part, part, validation_message
 from robot_dyn.scene.references import AnyReference, Circle, Hold, Line, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, one_of, per_joint, wrong_key
+from robot_dyn.simulation.results.run_file import RUN
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 Factories = Mapping[str, Callable[..., Effect]]
@@ -218,6 +219,8 @@ def read_scene(path: str | Path, *, effects: Factories | None = None) -> Setup:
 def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene, Setup]:
     """Return a scene as written, and the setup it describes; for errors, see `read_scene`."""
     data = read(path, MAX_BYTES, SceneError, "run robot-dyn scene for a scene to start from")
+    if data.startswith(RUN.start):
+        raise SceneError(f"{path}: is a run file or another archive, not a scene; robot-dyn replay shows a run file")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:

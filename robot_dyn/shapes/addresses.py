@@ -1,7 +1,12 @@
-"""Mesh addresses in a URDF, resolved to files: package://, file://, or a path relative to the URDF's folder."""
+"""Mesh addresses in a URDF, resolved to files: package://, file://, or a path relative to the URDF's folder.
+
+Paths of another computer, of Linux or Windows, are searched by their ends in the folders above the URDF, then by name
+in meshes/ next to it.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import suppress
@@ -14,6 +19,7 @@ from robot_dyn.foundations.errors import CatalogError, shorten
 from robot_dyn.shapes.mesh_files import MeshError
 
 _LEVELS = 4  # of folders above a URDF that may be its package, as in package/robots/arm/urdf
+_LONGEST = 8  # parts of the longest end of a path that is searched
 
 
 def shown(address: str | None) -> str:
@@ -23,44 +29,75 @@ def shown(address: str | None) -> str:
     return shorten(re.split(r"[/\\]", address)[-1] if rooted else address)
 
 
+def as_written(address: str | None) -> str:
+    """Return an address as the file writes it, for messages that stay on this machine."""
+    return shorten((address or "").strip(), 200)
+
+
 def find_file(
     address: str | None, source: Path, package_dirs: tuple[str | Path, ...], remarks: list[str] | None = None
 ) -> Path:
-    """Return the file of an address in the URDF `source`; it need not exist.
+    """Return the file of an address in the URDF `source`.
 
-    If a package is not found, its file is taken from a folder above the URDF that contains the same relative path, and
-    a remark is added.
+    If it is not there, another file is taken whose path ends like the address: in one of the folders above the URDF, or
+    in meshes/ next to it. A remark is then added.
 
     Raises:
-        MeshError: If the address does not name a file.
+        MeshError: If the address does not name a file, or no file is found; the message follows the address.
     """
     address = (address or "").strip()
-    kind = address.partition("://")[0] if "://" in address else ""
-    if not address or kind not in ("", "file", "package"):
-        raise MeshError(
-            f"the address {shown(address)!r} is not that of a local file; write a path, file:// or package://"
-        )
+    kind, path = _kind_and_path(address)
+    if not path or kind not in ("", "file", "package"):
+        raise MeshError("its address is not that of a local file; write a path, file:// or package://")
     if kind != "package":
-        return source.absolute().parent / (unquote(address.removeprefix("file://")) if kind else address)
-    for folders in (package_dirs, _installed()):
-        with suppress(CatalogError, OSError, ValueError):
-            return catalog.resolve(address, source, folders).resolve()
-    with suppress(OSError, ValueError):
-        name, _, inside = address.removeprefix("package://").lstrip("/").partition("/")
-        if folder := _above(inside, source):
-            remark = f"package {shorten(name)!r} is not found; its files are taken from {folder.name!r} above the URDF"
+        for exact in (path, path.replace("\\", "/")):  # backslashes are letters of a name on Linux
+            if os.path.exists(file := source.absolute().parent / exact):
+                return file
+        fault = "some mesh files are not at their paths"
+        remedy = "write its path relative to the URDF"
+    else:
+        address, path = address.replace("\\", "/"), path.replace("\\", "/")
+        for folders in (package_dirs, _installed()):
+            with suppress(CatalogError, OSError, ValueError):
+                return catalog.resolve(address, source, folders).resolve()
+        name, _, path = path.lstrip("/").partition("/")
+        path = "" if ".." in Path(path).parts else path
+        fault = f"package {shorten(name)!r} is not found"
+        remedy = "add its package's folder to package_dirs, --package-dir or ROS_PACKAGE_PATH"
+    parts = [part for part in re.split(r"[/\\]+", path) if part not in ("", ".")]
+    for folder, end in _elsewhere(parts, source, whole=kind == "package"):
+        if os.path.isfile(file := folder.joinpath(*end)):
+            whole = kind == "package" and end == parts
+            place = f"its files are taken from {folder.name!r} above the URDF"
+            remark = f"{fault}; {place if whole else f'files of the same name are read in {file.parent.name!r}'}"
             if remarks is not None and remark not in remarks:
                 remarks.append(remark)
-            return (folder / inside).resolve()
-    raise MeshError(
-        f"no file for {shown(address)}; add its package's folder to package_dirs, --package-dir or ROS_PACKAGE_PATH"
-    )
+            return file.resolve()
+    raise MeshError(f"there is no such file on this computer; put it in meshes/ next to the URDF, or {remedy}")
 
 
-def _above(inside: str, source: Path) -> Path | None:
-    """Return the folder above the URDF that contains this file, for packages that were renamed or are missing."""
-    folders = source.absolute().parents[:_LEVELS] if inside and ".." not in Path(inside).parts else ()
-    return next((folder for folder in folders if (folder / inside).is_file()), None)
+def _kind_and_path(address: str) -> tuple[str, str]:
+    """Return the scheme of an address, and its path without the host "localhost"; file:// is decoded."""
+    if not address.startswith("file:"):
+        kind, separator, path = address.partition("://")
+        return (kind, path) if separator else ("", address)
+    path = unquote(address.removeprefix("file:").removeprefix("//"))
+    path = path.removeprefix("localhost") if path.startswith("localhost/") else path
+    return "file", re.sub(r"^/(?=[A-Za-z]:[/\\])", "", path)  # file:///C:/meshes/arm.stl
+
+
+def _elsewhere(parts: list[str], source: Path, whole: bool) -> Iterator[tuple[Path, list[str]]]:
+    """Yield folders and ends of a path to search: the longest end first, and the nearest folder.
+
+    A name alone is searched only next to the URDF and in meshes/ there, unless it is the `whole` path in a package.
+    """
+    folders = source.absolute().parents[:_LEVELS]
+    for k in range(max(0, len(parts) - _LONGEST), len(parts)):
+        end = parts[k:]
+        wide = len(end) > 1 or (whole and k == 0)
+        yield from ((folder, end) for folder in folders[: None if wide else 1] if ".." not in end)
+    if parts and parts[-1] != "..":
+        yield folders[0], ["meshes", parts[-1]]
 
 
 def _installed() -> Iterator[Path]:

@@ -18,7 +18,7 @@ from robot_dyn.description.description import Description
 from robot_dyn.description.inertia import MassProperties, combined
 from robot_dyn.description.markup import parse
 from robot_dyn.shapes import elements, meshes, primitives, surface
-from robot_dyn.shapes.addresses import find_file, shown
+from robot_dyn.shapes.addresses import as_written, find_file
 from robot_dyn.shapes.mesh_files import MeshError
 
 
@@ -91,7 +91,8 @@ class _Reader:
     """Reader of the shapes of one file, which reads each mesh once."""
 
     def __init__(self, source: Path, package_dirs: tuple[str | Path, ...], allow_overlap: bool) -> None:
-        self.file = partial(find_file, source=source, package_dirs=package_dirs)
+        self.remarks: list[str] = []  # of the shape that is read
+        self.file = partial(find_file, source=source, package_dirs=package_dirs, remarks=self.remarks)
         self._mesh = cache(partial(_of_mesh, allow_overlap=allow_overlap))
 
     def shape(self, kind: str, stated: list[Any]) -> LinkShape | None:
@@ -100,6 +101,7 @@ class _Reader:
         Raises:
             MeshError: If one cannot be read, or all of them are flat.
         """
+        self.remarks.clear()
         read = [self.bodies(element) for element in stated]
         solid, hull, shell = (
             [body for bodies in read if (body := getattr(bodies, key)) is not None]
@@ -110,10 +112,12 @@ class _Reader:
             if flat is None:
                 return None
             raise MeshError(
-                f"mesh {shown(flat.get('filename'))}: is flat and encloses no volume; export a closed surface, use a"
-                " box, or add an <inertial>"
+                f"mesh {as_written(flat.get('filename'))}: is flat and encloses no volume; export a closed surface,"
+                " use a box, or add an <inertial>"
             )
-        return LinkShape(combined(solid), combined(hull), combined(shell), _origin(kind, stated, read))
+        # no names of folders: the words become a comment in the file, and the file may be published
+        elsewhere = ", in a file of the same name instead of the stated one" if self.remarks else ""
+        return LinkShape(combined(solid), combined(hull), combined(shell), _origin(kind, stated, read) + elsewhere)
 
     def bodies(self, element: Any) -> _Bodies:
         """Return the bodies of one element, in the frame of the link."""
@@ -128,7 +132,7 @@ class _Reader:
         try:
             return self._mesh(self.file(address), elements.numbers(element, "scale", 3, "1 1 1"))
         except MeshError as error:
-            raise MeshError(f"mesh {shown(address)}: {error}") from None
+            raise MeshError(f"mesh {as_written(address)}: {error}") from None
 
 
 def _of_mesh(path: Path, scale: tuple[float, ...], allow_overlap: bool) -> _Bodies:

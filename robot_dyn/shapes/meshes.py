@@ -132,6 +132,8 @@ def _stl(data: bytes, missing: list[str], digits: str) -> ndarray:
         ValueError: If the file is truncated, or a corner is not three numbers.
     """
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= _HEADER else 0
+    if not count and (rest := len(data) - _HEADER) > 0 and not rest % _RECORD.itemsize:
+        count = rest // _RECORD.itemsize  # exporters that write as a stream leave the count 0
     stated = _HEADER + count * _RECORD.itemsize
     ascii_ = data.lstrip()[:5].lower() == b"solid" and stated != len(
         data

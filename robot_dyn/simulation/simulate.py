@@ -11,10 +11,8 @@ from dataclasses import fields, replace
 from time import perf_counter
 from typing import Any, NamedTuple, Unpack, cast
 
-from numpy.typing import ArrayLike
-
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.validate import function
+from robot_dyn.foundations.validate import JointValues, function
 from robot_dyn.foundations.values import cached, derived
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
 from robot_dyn.integrate.time_stepping import MoreauJean
@@ -44,8 +42,8 @@ from robot_dyn.simulation.setup.setup import Setup, check_record
 @takes_options
 def simulate(
     what: Setup | Plant | Dynamics,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     *,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],

@@ -16,15 +16,15 @@ _MOST_SETTINGS = 60
 
 
 def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
-    """Return the settings in which runs of one robot differ from the first; for others, no rows."""
+    """Return the settings in which runs differ from the first; no rows if the runs are not of one robot."""
     (_, first), *others = named
     if any(not comparable(first, other) for _, other in others):
         return {"runs": [], "rows": []}
     pairs = [{setting.name: setting for setting in differing_settings(first, other)} for _, other in others]
     rows = []
     for name in list(dict.fromkeys(name for pair in pairs for name in pair))[:_MOST_SETTINGS]:
-        of_first = next(pair[name].a for pair in pairs if name in pair)
-        rows.append([name, of_first, *(pair[name].b if name in pair else of_first for pair in pairs)])
+        first_value = next(pair[name].a for pair in pairs if name in pair)
+        rows.append([name, first_value, *(pair[name].b if name in pair else first_value for pair in pairs)])
     return {"runs": [name for name, _ in named], "rows": rows}
 
 
@@ -52,11 +52,11 @@ def _rows(run: TrajectoryData) -> Iterator[tuple[str, str]]:
 
 def _accuracy(run: TrajectoryData) -> Iterator[tuple[str, str]]:
     """Yield the requested accuracy and the cost of one digit more or fewer; assume time proportional to evaluations."""
-    of = run.accuracy
-    assert of is not None
-    at = f", at rtol {of.rtol:.1e}" if of.rtol else ""
-    yield "accuracy asked for", f"{of.requested:.1e}{at}"
-    yield "pilots and check", f"{of.pilots} and {of.check} evaluations"
-    for name, evaluations in (("a digit more", of.digit_more), ("a digit less", of.digit_less)):
-        part = evaluations / max(of.run, 1)
+    accuracy = run.accuracy
+    assert accuracy is not None
+    at = f", at rtol {accuracy.rtol:.1e}" if accuracy.rtol else ""
+    yield "requested accuracy", f"{accuracy.requested:.1e}{at}"
+    yield "pilots and check", f"{accuracy.pilots} and {accuracy.check} evaluations"
+    for name, evaluations in (("a digit more", accuracy.digit_more), ("a digit less", accuracy.digit_less)):
+        part = evaluations / max(accuracy.run, 1)
         yield name, f"about {evaluations:.0f} evaluations, {format_duration(part * run.statistics.wall_s)}"

@@ -251,11 +251,11 @@ def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
 
 
 def test_free_flight_bounds_no_step() -> None:
-    """J = [[0, 1], [0, 0]]: no force acts back."""
+    """J = [[0, 1], [0, 0]]: no force depends on the motion."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
     advice = rd.advise(bar, [0.1], [1.0], duration_s=0.2, step_s=1e-2, method="RK4")
     assert advice.stable
-    assert "no force acts back on the motion" in str(advice.fastest)
+    assert "no force depends on the motion" in str(advice.fastest)
     assert all(limit == np.inf for limit in advice.limits.values())
 
 

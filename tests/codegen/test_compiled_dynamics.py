@@ -20,6 +20,7 @@ from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import QueryError, SingularError
 from robot_dyn.lagrange import floored, magnitudes
 from robot_dyn.queries import EQUATION
+from robot_dyn.queries import QUANTITIES as QUERIES
 from tests.codegen.arms import ARMS, compiled, states
 from tests.long import long
 from tests.random_trees import RandomTree, trees
@@ -70,6 +71,52 @@ def test_a_batch_is_its_states_one_by_one(arm: str, quantity: str) -> None:
     assert np.max(np.abs(batch - single)) <= 1e-13 * np.max(np.abs(single))
     assert np.array_equal(method(*(x[:20] for x in arguments)).reshape(20, -1), batch[:20])
     assert len(method(*(x[:0] for x in arguments))) == 0
+
+
+AXES = "world_aligned", "body", "world"
+FRAMED = [name for name, quantity in QUERIES.items() if quantity.framed]
+
+
+@pytest.mark.parametrize(("arm", "some"), [("planar_2r", 2), ("ur5", 2), ("skew_tree", 3), ("mimic_chain", 3)])
+@pytest.mark.parametrize("name", FRAMED)
+def test_a_batch_of_frames_is_machine_code_and_agrees_with_the_lagrangian(arm: str, some: int, name: str) -> None:
+    """To 1e-12 of the terms added into an entry, at links and a joint, with all axes; Pinocchio's in the self-check."""
+    engine, quantity = compiled(arm), QUERIES[name]
+    own, (q, v, _) = rd.Lagrangian(engine.robot), states(engine.n, 40)
+    frames = {link: link for link in (engine.robot.frame_names[0], *engine.robot.frame_names[-some:])}
+    joint = engine.joint_names[-1]
+    frames[joint] = engine.robot.description.joint_frames[joint]
+    for frame, link in frames.items():
+        for axes in AXES if quantity.directed else ("",):
+            options = {"expressed_in": axes} if axes else {}
+            ours, theirs = (quantity.ask(x, {"q": q, "v": v}, frame, **options) for x in (engine, own))
+            rows = [(magnitudes(own.linkage, q[i]), {"q": abs(q[i]), "v": abs(v[i])}) for i in range(len(q))]
+            terms = np.array([quantity.terms(*row, link) for row in rows])
+            assert np.all(np.abs(ours - theirs) <= 1e-12 * np.maximum(terms, terms.max(axis=0)))
+            assert f"{name} of {', '.join((link, *options.values()))}" in engine.instructions
+
+
+def test_a_batch_of_frames_has_the_errors_and_the_type_of_other_batches() -> None:
+    engine, narrow = compiled("ur5"), compiled("ur5", "float32")
+    q = states(6, 20)[0]
+    q[7, 2] = np.nan
+    with pytest.raises(QueryError, match="row 7"):
+        engine.placement(q, "tool0")
+    rows = engine.nan_rows.placement(q, "tool0")
+    assert np.flatnonzero(np.isnan(rows).any(axis=(1, 2))).tolist() == [7]
+    for frame in ("tool", ["tool0"], None):
+        with pytest.raises(QueryError, match="frame"):
+            engine.placement(q[:5], frame)  # pyright: ignore[reportArgumentType]
+        with pytest.raises(QueryError, match="frame"):
+            engine.placement(q[8:], frame)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(QueryError, match="expressed_in"):
+        engine.jacobian(q[8:], "tool0", expressed_in="tool")
+    for batch in (q[0], q[:5], q[8:]):
+        out = np.empty((*batch.shape[:-1], 6, 6), np.float32)
+        assert narrow.jacobian(batch, "tool0", out=out) is out
+        assert np.max(np.abs(out - engine.jacobian(batch, "tool0"))) <= 2e-5 * np.max(np.abs(out))
+    far = q[8:] + 2 * np.pi * 1_600_000
+    assert np.max(np.abs(engine.placement(far, "tool0") - engine.robot.placement(far, "tool0"))) < 1e-11
 
 
 def test_threads_give_the_same_numbers() -> None:

@@ -189,3 +189,38 @@ def test_a_message_of_another_definition_is_refused_by_name(tmp_path: Path, defi
             log.write_message("/joint_states", state, (header if "header" in definition else {}) | message, k, k, k)
     with pytest.raises(PlanError, match=r"log\.mcap: message 1 of /joint_states lacks the header, names or positions"):
         rd.control.from_samples(ARM, path)
+
+
+def late(messages: list[Message], ns: int, q: np.ndarray | None = None) -> list[Message]:
+    """Messages of a second publisher, whose clock is behind, with its own positions."""
+    rows = messages if q is None else [m._replace(names=list(NAMES), position=list(q)) for m in messages]
+    return [m._replace(header=m.header - ns, log=m.log + 1) for m in rows]
+
+
+@pytest.mark.parametrize("ns", [0, 60_000_000, 10**9, 10**12])
+@pytest.mark.parametrize("time", ["header", "log"])
+def test_two_publishers_on_one_topic_are_named(tmp_path: Path, ns: int, time: str) -> None:
+    """A robot, and a simulator that publishes zeros, by either time."""
+    pairs = zip(measured(), late(measured(), ns, np.zeros(6)), strict=True)
+    path = write(tmp_path / "log.mcap", [message for pair in pairs for message in pair])
+    with pytest.raises(PlanError, match="two publishers appear to be interleaved"):
+        rd.control.from_samples(ARM, path, time=time, ends="measured")
+
+
+def test_publishers_of_different_joints_are_named_and_one_of_them_can_be_read(tmp_path: Path) -> None:
+    """The remedy of the message works."""
+    messages = [
+        message._replace(
+            names=[name for name in message.names if (name in NAMES[:3]) is first],
+            position=[
+                x for name, x in zip(message.names, message.position, strict=True) if (name in NAMES[:3]) is first
+            ],
+        )
+        for message in measured()
+        for first in (True, False)
+    ]
+    path = write(tmp_path / "log.mcap", messages)
+    with pytest.raises(PlanError, match=r"two publishers share the topic; read one by joints="):
+        rd.control.from_samples(ARM, path)
+    plan = rd.control.from_samples(ARM, path, joints={name: name for name in NAMES[:3]}, q0=np.zeros(6))
+    np.testing.assert_allclose(plan.reference.at(T)[0][:, :3], REST[:, :3], atol=1e-8)

@@ -47,6 +47,37 @@ def test_a_link_with_another_mass_and_inertia_is_that_of_an_edited_file() -> Non
     assert ours.total_mass == pytest.approx(theirs.total_mass, rel=1e-14)
 
 
+def stated(robot: rd.Robot, link: str) -> tuple[float, np.ndarray]:
+    """Mass and moments of a link in the file of a robot."""
+    file = etree.fromstring(robot.description.xml)
+    inertial = next(each for each in file.iterfind("link") if each.get("name") == link).find("inertial")
+    x = {key: float(text) for key, text in inertial.find("inertia").items()}
+    rows = [["ixx", "ixy", "ixz"], ["ixy", "iyy", "iyz"], ["ixz", "iyz", "izz"]]
+    return float(inertial.find("mass").get("value")), np.array([[x[key] for key in row] for row in rows])
+
+
+def test_a_link_of_another_density_has_its_mass_and_moments_scaled_together(tmp_path) -> None:
+    """Mass and moments times 1.7, as in an edited file: in both implementations, with other edits, and written out."""
+    mass, inertia = stated(TREE, LINK)
+    more = {"mass_scale": 1.3, "payload": rd.Payload("left_lower", 0.7, (0.1, 0.0, 0.2))}
+    q, v, a = STATES
+    for start, m, moments in (
+        (TREE, mass, inertia),
+        (TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA}), 2.7, INERTIA),
+    ):
+        ours = start.with_(mass_scales={LINK: 1.7}, **more)
+        theirs = edited(TREE, LINK, 1.7 * m, 1.7 * moments).with_(**more)
+        for ask in (lambda x: x.M(q), lambda x: x.C(q, v), lambda x: x.N(q), lambda x: x.inverse_dynamics(q, v, a)):
+            expected = ask(theirs)
+            np.testing.assert_allclose(ask(ours), expected, rtol=1e-14, atol=1e-14)
+            np.testing.assert_allclose(ask(rd.Lagrangian(ours)), expected, rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(ask(rd.compiled(ours)), expected, rtol=1e-12, atol=1e-12)
+        alone = start.with_(masses={LINK: 1.7 * m}, **more)  # the moments of the lighter link stay
+        assert np.abs(alone.M(q) - ours.M(q)).max() > 1e-4
+        written = rd.load(ours.to_urdf(tmp_path / "scaled.urdf"))
+        np.testing.assert_allclose(written.M(q), ours.M(q), rtol=1e-12, atol=1e-12)
+
+
 def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
     plan = rd.control.quintic(STATES[0], STATES[0] + 0.4, 0.2)
     control = None if model is None else rd.control.ComputedTorque(model, plan, kp=50.0, kd=9.0)
@@ -72,6 +103,24 @@ def test_masses_and_inertias_of_links_are_sweep_parameters() -> None:
     assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-4
 
 
+def test_mass_scales_of_links_are_sweep_parameters() -> None:
+    """Of the arm and of the controller's model, and of a link called "model" whose name could be that of a factor."""
+    scales = np.array([0.6, 1.8])
+    assert f"{LINK}.mass_scale" in {x.name for x in rd.parameters(setup(TREE)).parameters}
+    runs = rd.rollouts(setup(TREE), vary={f"{LINK}.mass_scale": scales})
+    models = rd.rollouts(setup(TREE, TREE), vary={f"model.{LINK}.mass_scale": scales})
+    for k, factor in enumerate(scales):
+        scaled = TREE.with_(mass_scales={LINK: factor})
+        np.testing.assert_allclose(runs.q[k], rd.simulate(setup(scaled), engine="interpreted").q, atol=1e-12)
+        alone = rd.simulate(setup(TREE, scaled), engine="interpreted")
+        np.testing.assert_allclose(models.q[k], alone.q, atol=1e-12)
+    named = rd.Robot.from_text(TREE.description.xml.decode().replace(f'"{LINK}"', '"model"'))
+    both = rd.rollouts(setup(named, named), vary={"model.mass_scale": scales})
+    for k, factor in enumerate(scales):
+        alone = rd.simulate(setup(named, named.with_(mass_scale=factor)), engine="interpreted")
+        np.testing.assert_allclose(both.q[k], alone.q, atol=1e-12)
+
+
 def test_the_links_of_a_controllers_model_are_its_own() -> None:
     values = np.array([1.1, 2.9])
     runs = rd.rollouts(setup(TREE, TREE), vary={f"model.{LINK}.mass": values})
@@ -88,6 +137,7 @@ def test_two_parameters_of_one_size_are_not_taken_for_each_other() -> None:
         ("armature", [0.1, 0.3], lambda x: swing.with_(armature=x)),
         ("mass_scale", [0.5, 1.3], lambda x: swing.with_(mass_scale=x)),
         ("rod.mass", [0.5, 1.3], lambda x: swing.with_(masses={"rod": x})),
+        ("rod.mass_scale", [0.5, 1.3], lambda x: swing.with_(mass_scales={"rod": x})),
     ):
         runs = rd.rollouts(base, vary={name: values})
         for k, x in enumerate(values):
@@ -96,16 +146,19 @@ def test_two_parameters_of_one_size_are_not_taken_for_each_other() -> None:
 
 
 def test_other_masses_are_kept_in_run_files(tmp_path) -> None:
-    run = rd.simulate(setup(TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})))
+    expected = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA}, mass_scales={LINK: 1.5, "torso": 0.8})
+    run = rd.simulate(setup(expected))
     again = rd.read(run.save(tmp_path / "run"))
     assert run.acting is not None and f"mass 2.7 kg of {LINK}" in run.acting
-    expected = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})
+    assert "mass_scale 0.8 of torso" in run.acting
     np.testing.assert_array_equal(robot_of(again).M(STATES[0]), expected.M(STATES[0]))
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"mass_scales": {LINK: 0.0}}, "mass_scale of 'left_lower' must be positive"),
+        ({"mass_scales": {"left_lowr": 1.0}}, "mass_scales: no link 'left_lowr'"),
         ({"masses": {LINK: 0.0}}, "mass of 'left_lower' must be positive"),
         (
             {"masses": {"left_lowr": 1.0}},

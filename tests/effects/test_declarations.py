@@ -337,7 +337,7 @@ class Windy(rd.effects.Dynamics):
 
 
 def test_equations_of_bodies_of_another_class_are_not_those_of_the_robot_in_it() -> None:
-    with pytest.raises(TraceError, match="Windy comes from no robot's file"):
+    with pytest.raises(TraceError, match="Windy is not a Robot"):
         rd.simulate(rd.Plant(Windy()), Q, V, engine="compiled", duration_s=0.1)  # pyright: ignore[reportArgumentType]
 
 

@@ -102,7 +102,7 @@ IN_A_RUN = [
     (lambda: rd.simulate(plant(STOPS), [0.3, 1.2]), r"q0: 'joint_2' is 0\.2 beyond its upper stop"),
     (lambda: setup(PLAY, method="GaussLegendre4"), "rigid_backlash: "),
     (lambda: setup(PLAY, method="MoreauJean"), "rigid_backlash: "),
-    (lambda: setup(SOFT, method="MoreauJean"), "series_elastic: MoreauJean takes no motors of a drive"),
+    (lambda: setup(SOFT, method="MoreauJean"), "series_elastic: MoreauJean cannot integrate the motors of a drive"),
     (
         lambda: setup(BODY, method="GaussLegendre4"),
         "carried_payload: .* changes momenta, which GaussLegendre4 integrates",
@@ -115,7 +115,7 @@ IN_A_RUN = [
         for method, why in (("GaussLegendre4", "momenta"), ("Euler", "order 1"))
     ),
     *(
-        (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", cuts=False), f"cuts=False: {why}")
+        (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", uncut=True), f"uncut: {why}")
         for effect, why in (
             (DRY, "dry_friction stops and releases joints, where steps must"),
             (PLAY, "rigid_backlash stops and releases joints"),

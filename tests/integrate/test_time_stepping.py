@@ -226,14 +226,14 @@ def test_it_estimates_no_error_and_finds_no_events() -> None:
     run = rd.simulate(plant, [0.3, 0.2], duration_s=0.1, step_s=1e-3, method="MoreauJean")
     assert run.error.ends_early.kind is DoubtKind.NO_ORDER_OF_IMPACTS
     event = rd.Event(lambda t, q, v: q[0] - 0.25)
-    with pytest.raises(QueryError, match="MoreauJean are not cut; take method='DOP853'"):
+    with pytest.raises(QueryError, match="MoreauJean cannot end at them; take method='DOP853'"):
         rd.simulate(plant, [0.3, 0.2], step_s=1e-3, method="MoreauJean", events=[event])
     with pytest.raises(QueryError, match="1e-06 beyond its upper stop"):
         rd.simulate(
             rd.Plant(ARM, [rd.effects.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, method="MoreauJean"
         )
-    with pytest.raises(QueryError, match=r"cuts=False: .* where steps must end"):
-        rd.rollouts(plant, [0.3, 0.2], method="RK4", step_s=1e-3, cuts=False)
+    with pytest.raises(QueryError, match=r"uncut: .* where steps must end"):
+        rd.rollouts(plant, [0.3, 0.2], method="RK4", step_s=1e-3, uncut=True)
 
 
 def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -96,6 +96,7 @@ WRITTEN = {  # kinds whose keys are not the coefficients of a class, and the pla
     "gravity": ("", lambda: rd.Plant(rd.load("planar_2r"))),
     "lock": ("joints = {joint_1 = 0.2}", lambda: rd.Plant(ARM.with_(lock={"joint_1": 0.2}))),
     "payload": ('frame = "tip"\nmass_kg = 0.5', lambda: rd.Plant(ARM.with_(payload=rd.Payload("tip", 0.5)))),
+    "mass_scale": ("factors = {bar_2 = 1.7}", lambda: rd.Plant(ARM.with_(mass_scales={"bar_2": 1.7}))),
     "armature": (
         "inertia_kg_m2 = {joint_1 = 0.002, joint_2 = 0.001}\ngear_ratio = {joint_1 = 9.0}",
         lambda: rd.Plant(ARM.with_(armature=[0.002 * 81.0, 0.001])),
@@ -205,6 +206,9 @@ def test_a_missing_scene_is_told(tmp_path) -> None:
     (tmp_path / "latin.toml").write_bytes(b'robot = "\xe9"')
     with pytest.raises(SceneError, match="is not UTF-8 text"):
         rd.read_scene(tmp_path / "latin.toml")
+    run = rd.simulate(rd.load("planar_2r"), [0.1, 0.2], duration_s=0.01).save(tmp_path / "run.npz")
+    with pytest.raises(SceneError, match="is a run file"):
+        rd.read_scene(run)
 
 
 def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:

@@ -108,11 +108,11 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.rollouts(ARM, method="RK4"), r"rollouts: give q0, the position at the start, of shape \(2,\)"),
         (lambda: rd.rollouts(ARM, np.zeros((0, 2)), method="RK4"), "the same number of runs"),
         (
-            lambda: rd.rollouts(ARM, Q, method="RK4", events=[rd.Event(lambda t, q, v: v[0])], cuts=False),
-            "cuts=False: steps end at events, so the runs are not in lock step",
+            lambda: rd.rollouts(ARM, Q, method="RK4", events=[rd.Event(lambda t, q, v: v[0])], uncut=True),
+            "uncut: steps end at events, so the runs are not in lock step",
         ),
-        (lambda: rd.rollouts(ARM, Q, cuts=False), "cuts=False: DOP853 chooses its steps"),
-        (lambda: rd.rollouts(ARM, Q, method="RK4", cuts="no"), "cuts must be True or False, got 'no'"),
+        (lambda: rd.rollouts(ARM, Q, uncut=True), "uncut: DOP853 chooses its steps"),
+        (lambda: rd.rollouts(ARM, Q, method="RK4", uncut="no"), "uncut must be True or False, got 'no'"),
         (
             lambda: rd.rollouts(rd.Setup(PLANT, Q, accuracy=1e-6)),
             r"accuracy has no effect, simulate one of the runs.*dataclasses.replace\(setup, accuracy=None\)",

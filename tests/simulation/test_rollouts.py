@@ -414,7 +414,7 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     q0, v0 = np.tile([0.2, 0.15], (70, 1)), np.full((70, 2), [0.05, -0.1])
     strikes = [2, 65]
     v0[strikes] = [[2.0, -1.4], [-0.8, 2.4]]
-    runs, uncut = (rd.rollouts(setup, q0, v0, record=EVERYTHING, cuts=cuts) for cuts in (True, False))
+    runs, uncut = (rd.rollouts(setup, q0, v0, record=EVERYTHING, uncut=passing) for passing in (False, True))
     for i in strikes:
         alone = rd.simulate(setup, q0=q0[i], v0=v0[i])
         assert len(alone.events) > 5 and runs.outcome(i) == alone.outcome and runs.steps[i] == alone.statistics.steps
@@ -426,7 +426,8 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     for x, y in zip(arrays(runs), arrays(uncut), strict=True):
         np.testing.assert_array_equal(x[others], y[others])
     assert "2 of them repeated with steps cut at thresholds" in runs.statistics.engine
-    assert "cuts=False: no step ends at lower stop, upper stop" in uncut.summary and "cuts" not in runs.summary
+    assert runs.statistics.one_by_one == 2 and uncut.statistics.one_by_one == 0
+    assert uncut.uncut == ("lower stop", "upper stop") and runs.uncut == () and runs.comparison is None
 
 
 def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) -> None:

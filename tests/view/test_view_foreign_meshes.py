@@ -34,6 +34,7 @@ TEXTS = (facets(), facets("nan nan nan"), facets("-1E-3 +.5 0.7"), facets(vertex
          "\n\n" + facets().replace("\n", "\r\n"))  # fmt: skip
 ODD = [*(lambda binary, text=text: text.encode() for text in TEXTS), lambda binary: b"solid" + binary[5:]]
 ODD.append(lambda binary: b"     " + binary[5:] + b"made by hand")
+ODD.append(lambda binary: binary[:80] + bytes(4) + binary[84:])  # written as a stream: the count stays 0
 
 
 @pytest.mark.parametrize("write", ODD)

@@ -16,7 +16,6 @@ from math import inf, isfinite, log10
 from typing import ClassVar, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.accuracy.certificate.digit_count import (
     CountedDigits,
@@ -32,7 +31,7 @@ from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import reported
-from robot_dyn.foundations.validate import choice, function, integer, joint_values
+from robot_dyn.foundations.validate import JointValues, choice, function, integer, joint_values
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
@@ -205,10 +204,10 @@ class Certificate(Result):
 def certify(
     robot: Robot,
     *,
-    q: ArrayLike | None = None,
-    v: ArrayLike | None = None,
-    a: ArrayLike | None = None,
-    tau: ArrayLike | None = None,
+    q: JointValues | None = None,
+    v: JointValues | None = None,
+    a: JointValues | None = None,
+    tau: JointValues | None = None,
     samples: int = 10_000,
     seed: int = 0,
     repeats: int = 11,
@@ -272,7 +271,7 @@ def certify(
 
 
 def _state(
-    robot: Robot, q: ArrayLike | None, v: ArrayLike | None, a: ArrayLike | None, tau: ArrayLike | None
+    robot: Robot, q: JointValues | None, v: JointValues | None, a: JointValues | None, tau: JointValues | None
 ) -> dict[str, np.ndarray] | None:
     """Return the additional state of the user, or None."""
     others = {name: x for name, x in {"v": v, "a": a, "tau": tau}.items() if x is not None}

@@ -17,7 +17,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Block, Table, number_or_dash
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.result import reported
-from robot_dyn.foundations.validate import choice, function, integer, number
+from robot_dyn.foundations.validate import JointValues, choice, function, integer, number
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration
@@ -119,8 +119,8 @@ class Cost(Result):
 
 def cost(
     what: Setup | Plant | Dynamics,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     *,
     controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None = None,
     budget_s: float = 10.0,

@@ -32,7 +32,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Block, Table, number_or_dash
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import reported
-from robot_dyn.foundations.validate import function, instance, integer, number, truth
+from robot_dyn.foundations.validate import JointValues, function, instance, integer, number, truth
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, as_method
@@ -219,8 +219,8 @@ class WorkPrecision(Result):
 
 def work_precision(
     what: Setup | Plant | Dynamics,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     *,
     duration_s: float | None = None,
     controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None = None,

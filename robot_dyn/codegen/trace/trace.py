@@ -34,11 +34,18 @@ from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.lagrange.recursions.regressor import regressor
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, acceleration
+from robot_dyn.queries.dynamics import QUANTITIES as QUERIES
+from robot_dyn.queries.quantity import Key, Quantity, of_frame
 
 QUANTITIES = EQUATION | {"forward_dynamics_derivatives": FORWARD_DYNAMICS_DERIVATIVES}  # quantities with formulations
 _SOLVED_MOST = 8  # joints in series; beyond, solving M a = τ − … is longer than the articulated-body algorithm
 _DERIVED_MOST = 6  # joints; beyond, C v derived from K is longer, and takes as long to trace as all others together
 _CLOSED_FORM_MOST = 4  # joints; beyond, its O(n³) terms make it the longest formulation, except of C
+
+
+def keyed(key: Key) -> Quantity:
+    """Return the quantity of a key."""
+    return of_frame(QUERIES[key[0]], key[1]) if isinstance(key, tuple) else QUANTITIES[key]
 
 
 @final
@@ -102,23 +109,28 @@ class Trace:
 
     @interrupts_later()
     @in_arithmetic
-    def formulations(self, name: str) -> dict[str, ca.Function]:
+    def formulations(self, name: Key) -> dict[str, ca.Function]:
         """Return a quantity by each formulation that is worth tracing."""
-        arguments = [*(self.symbols[argument][0] for argument in QUANTITIES[name].arguments), *self.given]
+        arguments = [*(self.symbols[argument][0] for argument in keyed(name).arguments), *self.given]
         return {
             formulation: ca.Function("f", arguments, [ca.cse(ca.densify(formula()))])
             for formulation, formula in self._formulations(name)
         }
 
-    def quantity(self, name: str) -> Traced:
+    def quantity(self, name: Key) -> Traced:
         """Return the trace of a query of `Dynamics`, or of "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
         functions = self.formulations(name)
         counts = {formulation: instructions(function) for formulation, function in functions.items()}
         least = min(counts, key=counts.__getitem__)
         return Traced(functions[least], least, counts)
 
-    def _formulations(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
+    def _formulations(self, name: Key) -> Iterator[tuple[str, Callable[[], Node]]]:
         """Return the formulations of a quantity; the closed form always if there is no other."""
+        if isinstance(name, tuple):  # queries of frames do not need inertias
+            query, *frame = name
+            arrays = [self.symbols[argument][1] for argument in keyed(name).arguments]
+            yield "closed form", lambda: column(self.lagrangian._answer(query, tuple(arrays), None, tuple(frame)))
+            return
         own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
         articulated = name == "forward_dynamics" and not coupled
         depth = max(len(body.path) for body in own.linkage.bodies) if articulated else 0

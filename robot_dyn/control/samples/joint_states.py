@@ -139,6 +139,12 @@ def _of_joints(
         if len(position) != len(names) or len(set(names)) < len(names):
             raise PlanError(f"{where} has {len(position)} positions for {len(set(names))} different names; fix the log")
         row = {name: x for name, x in zip(names, position, strict=True) if name in wanted}
+        if rows and row.keys().isdisjoint(rows[0]):
+            here, before = (shorten(", ".join(one), 80) for one in (row, rows[0]))
+            raise PlanError(
+                f"{where} names {here}, the messages before it {before}: two publishers share the topic; read one by"
+                " joints={joint: name} with q0= for the other joints, or record them on two topics"
+            )
         if rows and row.keys() != rows[0].keys():
             odd = ", ".join(sorted(row.keys() ^ rows[0].keys()))
             raise PlanError(f"{where} has other joints than the messages before it: {odd}; split the log")

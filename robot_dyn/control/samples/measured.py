@@ -10,6 +10,7 @@ import numpy as np
 from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.control.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
+from robot_dyn.control.samples.publishers import refuse_alternating
 from robot_dyn.control.samples.recorded import recorded
 from robot_dyn.control.samples.spline import Samples, spline
 from robot_dyn.control.samples.turns import joined_turns
@@ -60,7 +61,7 @@ def from_samples(
             (when joints were measured) or "log" (when messages arrived), counted from the first message; by default
             "header" if headers have times.
         joints: Heading, with or without its unit, or name in a log, by joint, if these are not the names of joints;
-            other columns are then ignored.
+            other columns are then ignored. Without it, only columns without numbers are ignored.
         unit: "rad" or "deg", for angles without a unit in the heading; "rad" by default, unless they look like degrees.
         ends: "rest", with zero velocity and acceleration at both ends; or "measured", with the velocities and
             accelerations of a run's table if it has them, else not-a-knot. By default "rest", which is an error if 16
@@ -70,14 +71,16 @@ def from_samples(
         topic: Topic of a log; by default its only topic of joint states, or "/joint_states".
 
     Raises:
-        PlanError: If a column is missing or unknown, times do not increase, angles look like degrees or times like ms
-            without a unit, or joints move at the ends and `ends` is not passed.
+        PlanError: If the file is of another kind, a column is missing or unknown, times do not increase, samples of two
+            publishers interleave, angles look like degrees or times like ms without a unit, or joints move at the ends
+            and `ends` is not passed.
         MissingExtraError: If a log needs mcap or mcap-ros2-support, and it is not installed.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
     if ends is not None:
         choice("ends", ends, ("rest", "measured"), error=PlanError)
     samples = recorded(arm, source, time, joints, unit, q0, topic)
+    refuse_alternating(samples)
     refuse_other_units(samples)
     turns = joined_turns(samples)
     table, t, q = turns.table, turns.table.t, turns.table.q

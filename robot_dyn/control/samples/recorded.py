@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from robot_dyn.control.samples.sources import table_of
-from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of, size, unit_of
+from robot_dyn.control.samples.table import TIME_NAMES, Table, is_text, name_of, size, unit_of
 from robot_dyn.foundations.errors import PlanError, nearest, shown
 from robot_dyn.foundations.validate import choice, instance, number, numbers
 from robot_dyn.model.robot import Robot
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # headings other than t and q in the table of a run
 _OF_A_RUN = re.compile(r"([vau]|tau|power|start|desired|tracking error) .*|energy|residual|.* state \d+")
 _LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and its powers do not overflow
+_FEW, _PART = 3, 0.1  # smallest number, and fraction of the samples, whose times go back in two interleaved series
+TWO_PUBLISHERS = "keep the samples of one, or record its topic alone"
 _STEPS = 1e-12, 1e15  # [s]: fifth powers of such steps neither vanish nor overflow
 _NAME_JOINTS = "joints={joint: column}, --joint JOINT=COLUMN on the command line"
 
@@ -43,7 +45,7 @@ class Recorded:
         given: True for joints with a column, (n,); the others rest at q0.
         of_time: True if the unit of the times is known.
         more: v and a, (m, n), if the table is the export of a run.
-        note: Topic and origin of the times of a log.
+        note: Topic and origin of the times of a log, and columns of texts, which are skipped.
     """
 
     arm: Robot
@@ -93,6 +95,8 @@ def recorded(
     table = table_of(source, arm.joint_names, joints or {}, topic, time)
     heads, t, of_time = _times(table, time, least)
     at = _joints(arm, heads, joints)
+    skipped = [head for head, column in heads.items() if head not in at.values() and is_text(column)]
+    note = "; ".join([table.note] * bool(table.note) + [f"without the texts of {shown(skipped)}"] * bool(skipped))
     absent = [name for name in arm.joint_names if name not in at]
     if absent and (q0 is None or not at):
         names, rest = ("any joint", "") if q0 is not None else (", ".join(absent), ", or give its rest position in q0")
@@ -110,7 +114,7 @@ def recorded(
                     " correct or remove it"
                 )
     more = {} if joints is not None else _rates(arm, heads, unit)
-    return Recorded(arm, t, q, stated, np.array([name in at for name in arm.joint_names]), of_time, more, table.note)
+    return Recorded(arm, t, q, stated, np.array([name in at for name in arm.joint_names]), of_time, more, note)
 
 
 def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
@@ -138,6 +142,7 @@ def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, 
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.diff(t)
     for k in np.flatnonzero(steps <= 0)[:1]:
+        _refuse_two_series(t)
         remedy = "sort the samples, or remove duplicates"
         if table.t is not None:
             remedy = "use the other times, time='log' or time='header', or repair the log"
@@ -150,6 +155,26 @@ def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, 
             f" {_STEPS[0]:g} to {_STEPS[1]:g} s; check the unit of the times"
         )
     return heads, t, stated
+
+
+def _refuse_two_series(t: np.ndarray) -> None:
+    """Raise a PlanError if times that go back and forth are those of two increasing series."""
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back) < max(_FEW, _PART * len(t)):
+        return
+    lower, upper = -np.inf, -np.inf  # last time of each series
+    for x in t.tolist():
+        if x <= lower:
+            return  # no two series
+        lower, upper = (lower, x) if x > upper else sorted((x, upper))
+    k, pairs = back[0], (np.diff(t)[back] == 0).all()
+    fault = "repeat" if pairs else "go back"
+    single = "write the times with more digits" if pairs else "sort the samples"
+    raise PlanError(
+        f"two publishers appear to be interleaved: times {fault} at {len(back)} of {len(t)} samples, first from"
+        f" {t[k]:.9g} to {t[k + 1]:.9g} s at sample {k + 2}; {TWO_PUBLISHERS}; if there is"
+        f" only one, {single}"
+    )
 
 
 def _time_heading(heads: Mapping[str, np.ndarray], time: str | None) -> str:
@@ -197,6 +222,8 @@ def _joints(arm: Robot, heads: Mapping[str, np.ndarray], joints: Mapping[str, st
         if of_a_run and _OF_A_RUN.fullmatch(name):
             continue
         name = name.removeprefix("q ").strip() if of_a_run else name
+        if name not in arm.joint_names and is_text(heads[head]):
+            continue
         if name not in arm.joint_names and name.lower() in TIME_NAMES:
             others = "time= (--time or --period) gives times, too; remove one of them"
             raise PlanError(f"column {shown(head)} contains times, but {others}")

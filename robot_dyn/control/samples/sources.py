@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from robot_dyn.control.samples.joint_states import SUFFIX, TIMES, read_joint_states
+from robot_dyn.control.samples.other_files import refuse_other_files
 from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of
 from robot_dyn.foundations.errors import PlanError, shorten, shown
 from robot_dyn.foundations.files import csv_rows
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
 _MOST_BYTES = 2**28
 _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
+_BAG = "give the .mcap file in it, or a CSV file"
 
 
 def table_of(
@@ -58,7 +60,10 @@ def table_of(
     if topic is not None:
         raise PlanError(f"topic={shown(topic)} is for MCAP logs, but the samples are not from one; remove it")
     if is_file:
-        return Table(_of_csv(source))
+        refuse_other_files(source, _BAG if Path(source).is_dir() else _REMEDY)
+        times = TIME_NAMES if time is None else (time,) if isinstance(time, str) else ()
+        names = {name for name in (*(joints.values() or joint_names), *times) if isinstance(name, str)}
+        return Table(_of_csv(source, names, named_only=bool(joints)))
     if hasattr(source, "columns") and hasattr(source, "to_numpy"):
         columns = _of_frame(source, indexed=by_name)
     elif isinstance(source, Mapping):
@@ -94,25 +99,38 @@ def _values(column: Any) -> np.ndarray:
     return column.to_numpy()
 
 
-def _of_csv(path: str | Path) -> dict[str, np.ndarray]:
-    """Return the columns of a CSV file by heading.
+def _of_csv(path: str | Path, names: set[str], named_only: bool) -> dict[str, np.ndarray]:
+    """Return the columns of a CSV file by heading; columns without numbers as texts.
+
+    Args:
+        path: The file.
+        names: Names of joints and times, whose columns must be numbers.
+        named_only: True if other columns are ignored.
 
     Raises:
-        PlanError: If the file cannot be read, has no samples, or an entry is not a number; with file and line.
+        PlanError: If the file cannot be read, has no samples, or an entry of a named column, or of a column with
+            numbers, is not a number; with file and line.
     """
-    lines, rows = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY), list[list[float | None]]()
+    lines = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY)
     _, heads = next(lines)
     if wrong := _wrong_headings(heads):
         raise PlanError(f"{path}: {wrong}")
+    rows, odd = list[list[float | None]](), dict[int, tuple[str, str]]()  # the first text of each column
     for where, texts in lines:
         row = list(map(_number, texts))
-        if None in row:
-            k = row.index(None)
-            raise PlanError(f"{where}: column {shorten(heads[k])!r}: {shorten(texts[k])!r} is not a number; correct it")
+        for k in (k for k, x in enumerate(row) if x is None and k not in odd) if None in row else ():
+            odd[k] = where, texts[k]
         rows.append(row)
     if not rows:
         raise PlanError(f"{path}: has no samples below its first line; give at least 2")
-    return dict(zip(heads, np.array(rows, float).T, strict=True))
+    for k, (where, text) in odd.items():
+        head, has_numbers = heads[k], any(row[k] is not None for row in rows)
+        named = not names.isdisjoint((head, name_of(head), name_of(head).removeprefix("q ").strip()))
+        named |= name_of(head).lower() in names.intersection(TIME_NAMES)
+        if named or (has_numbers and not named_only):
+            raise PlanError(f"{where}: column {shorten(head)!r}: {shorten(text)!r} is not a number; correct it")
+    table = np.array(rows, dtype=float).T
+    return {head: np.full(len(rows), "") if k in odd else table[k] for k, head in enumerate(heads)}
 
 
 def _wrong_headings(heads: list[str]) -> str:

@@ -39,6 +39,15 @@ def unit_of(heading: str) -> str | None:
     return ((match[2] or match[3] or "").strip() or None) if match else None
 
 
+def is_text(column: np.ndarray) -> bool:
+    """Return True for a column without numbers: texts, truth values, stamps, or nothing but gaps."""
+    if column.dtype.kind != "O":
+        return column.dtype.kind in "bSUTMm" or (column.dtype.kind == "f" and bool(np.isnan(column).all()))
+    return not any(
+        isinstance(entry, int | float) and not isinstance(entry, bool) and entry == entry for entry in column
+    )
+
+
 def size(heading: str, kind: str, unit: str | None = None) -> tuple[float, bool]:
     """Return the unit of a column in SI units, and True if the heading, or `unit` for angles, states it.
 

@@ -117,7 +117,8 @@ class _Reader:
     def leave(self, kind: str, where: str, why: str) -> None:
         """Add a finding if `without` lists this kind of element; raise DescriptionError otherwise."""
         if kind not in self.without:
-            raise DescriptionError(f"{self.source}: {where}: {why}; remove it, or load with without={{{kind!r}}}")
+            remedy = f"remove it, or leave it out by --without {kind}, in Python without={{{kind!r}}}"
+            raise DescriptionError(f"{self.source}: {where}: {why}; {remedy}")
         self.findings.append(f"{where}: {why}; left out")
 
     def new(self, name: str) -> str:

@@ -239,8 +239,7 @@ def robot_to_compile(dynamics: object) -> Robot:
         robot = robot_of(dynamics)
         if robot is None or not of_library(type(dynamics)):  # another class may have other equations
             raise TraceError(
-                f"{type(dynamics).__name__} comes from no robot's file and cannot be compiled: use a Robot, "
-                "or engine='interpreted'"
+                f"{type(dynamics).__name__} is not a Robot and cannot be compiled: use a Robot, or engine='interpreted'"
             )
         if robot.joint_without_inertia is not None:
             raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: use engine='interpreted'")

@@ -35,12 +35,14 @@ _GUESSED = 10  # evaluations in a step of an implicit method, without those of i
 _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: per second, and at least per segment
 
 
-def choose(setup: Setup, seen: float) -> Engine:
+def choose(setup: Setup, min_evaluations: float) -> Engine:
     """Return the engine of a setup, as `engine.choice`; machine code with events is checked for each run."""
-    return cached(setup, engine_of, seen, lasts=lambda engine: isinstance(engine, MachineCode) and not setup.events)
+    return cached(
+        setup, engine_of, min_evaluations, lasts=lambda engine: isinstance(engine, MachineCode) and not setup.events
+    )
 
 
-def engine_of(setup: Setup, seen: float) -> Engine:
+def engine_of(setup: Setup, min_evaluations: float) -> Engine:
     """Return the engine of a setup, for `choose`, which caches it."""
     required = setup.engine == "compiled"
     try:
@@ -49,7 +51,7 @@ def engine_of(setup: Setup, seen: float) -> Engine:
         if code is not None:
             check(code, setup)
             return code
-        if not required and not _is_worthwhile(setup, interpreted_before(identified), seen):
+        if not required and not _is_worthwhile(setup, interpreted_before(identified), min_evaluations):
             most = _COMPILED / _in_all(setup, setup.equation.size) if setup.method.controls_error else inf
             return interpreted_engine(setup, "short: compiling is not worthwhile", most)
         return checked(setup, lambda: _of_one_run(setup))
@@ -107,13 +109,13 @@ def _of_one_run(setup: Setup, swept: tuple[str, ...] = ()) -> MachineCode:
     return machine_code(setup.equation, setup.method, swept=swept, cuts=setup.finds_events)
 
 
-def _is_worthwhile(setup: Setup, before: list[float], seen: float) -> bool:
+def _is_worthwhile(setup: Setup, before: list[float], min_evaluations: float) -> bool:
     """Return True if compiling takes less time than this run and the earlier interpreted runs of its structure.
 
     Otherwise, the evaluations of the run are added to `before`, those of the earlier runs.
     """
     size = setup.equation.size
-    count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
+    count = before[0] + max(min_evaluations * _in_all(setup, size), _evaluations(setup, size))
     if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
         return True
     before[0] = count

@@ -160,4 +160,4 @@ def _is_polynomial(value: Any) -> bool:
 
 def _of_edits(edits: Edits) -> tuple[Any, ...]:
     frames = tuple(payload.frame for payload in edits.payloads)
-    return edits.lock, frames, edits.armature, edits.mass_scale, edits.masses, edits.inertias
+    return edits.lock, frames, edits.armature, edits.mass_scale, edits.mass_scales, edits.masses, edits.inertias

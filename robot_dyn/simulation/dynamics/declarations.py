@@ -1,4 +1,4 @@
-"""Declarations by the parts of a setup: where their formulas are smooth, and that a run does not change them.
+"""Declarations of the parts of a setup: where their formulas are not smooth, and that a run leaves them unchanged.
 
     effect, controller    `thresholds`, () if it is smooth everywhere
     block                 `rounds`, True if its output jumps
@@ -26,7 +26,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import cached_properties
 from robot_dyn.model.robot import Robot
 
-_CHANGING = list, dict, set, bytearray
+_MUTABLE = list, dict, set, bytearray
 
 
 def undeclared(plant: Plant, controller: Controller | None) -> tuple[tuple[object, str], ...]:
@@ -35,7 +35,7 @@ def undeclared(plant: Plant, controller: Controller | None) -> tuple[tuple[objec
     if controller is not None:
         parts += [controller, *(block.part for block in controller.parts), *controller.references.values()]
     models = [plant.dynamics, *(controller.models.values() if controller is not None else ())]
-    pairs = [(part, _missing(part)) for part in parts] + [(model, _of_no_file(model)) for model in models]
+    pairs = [(part, _missing(part)) for part in parts] + [(model, _not_a_robot(model)) for model in models]
     return tuple((part, missing) for part, missing in pairs if missing)
 
 
@@ -84,15 +84,15 @@ def _missing(part: Any) -> str:
         return "declares no knots for its own at(t): define knots, the times at which it is not smooth"
     if name := next(_not_frozen(part), ""):
         return f"may change its attribute {name!r} in a run: make it a frozen dataclass, with that as a field"
-    if name := next((name for name in attributes(part) if isinstance(getattr(part, name, None), _CHANGING)), ""):
+    if name := next((name for name in attributes(part) if isinstance(getattr(part, name, None), _MUTABLE)), ""):
         return f"may change the content of its attribute {name!r}: make that a tuple or an array, or declare states"
     return ""
 
 
-def _of_no_file(dynamics: Any) -> str:
+def _not_a_robot(dynamics: Any) -> str:
     """Return the message for dynamics that are not those of a `Robot`; empty for a `Robot`."""
     robot = getattr(dynamics, "robot", dynamics)
-    return "" if isinstance(robot, Robot) else "comes from no robot's file: give a Robot"
+    return "" if isinstance(robot, Robot) else "is not a Robot: give a Robot"
 
 
 def attributes(part: object) -> tuple[str, ...]:
@@ -107,7 +107,7 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 
 def _not_frozen(part: Any) -> Iterator[str]:
-    """Yield the attributes that code may set after construction; the interface `Controller` sets those it declares."""
+    """Yield the attributes that code may set after construction, except those that `Controller` declares."""
     kind = type(part)
     is_frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen  # pyright: ignore[reportAttributeAccessIssue]
     constant = set(_fields(kind)) if is_frozen else set()

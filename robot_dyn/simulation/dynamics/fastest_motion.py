@@ -21,7 +21,7 @@ from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
 _FASTEST = "the fastest motion, of joint {moving_joint!r}, {motion} at {rate_per_s:.3g} per second because of "
-MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "no force acts back on the motion of {moving_joint!r}"
+MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "no force depends on the motion of {moving_joint!r}"
 """The sentence about the fastest motion, from `Fastest.facts`."""
 
 
@@ -33,7 +33,7 @@ class Fastest:
     Attributes:
         eigenvalue: λ, in [1/s].
         joint: Name of the joint that takes part most.
-        source: Name of the effect or of the control whose λ_k is the largest; BODIES if that of the bodies is.
+        source: Name of the effect or control with the largest |λ_k|; BODIES if the rigid bodies contribute most.
     """
 
     eigenvalue: complex
@@ -59,7 +59,7 @@ class Fastest:
 
 
 def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
-    """Return ∂y'/∂y by differences, without the rows and columns of the works, on which y' does not depend.
+    """Return ∂y'/∂y by differences, without the work integrals, on which y' does not depend.
 
     Args:
         equation: The state equation.
@@ -87,20 +87,20 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, 
     """
     n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
     values, right = np.linalg.eig(J)
-    counts = np.abs(np.imag(values)) > np.abs(np.real(values)) if oscillation else np.full(len(values), True)
-    if not counts.any():
+    candidates = np.abs(np.imag(values)) > np.abs(np.real(values)) if oscillation else np.full(len(values), True)
+    if not candidates.any():
         raise np.linalg.LinAlgError("no motion oscillates")
-    k = int(np.argmax(np.where(counts, np.abs(values), -1.0)))
+    k = int(np.argmax(np.where(candidates, np.abs(values), -1.0)))
     x = right[:, k]
-    others, left = np.linalg.eig(J.T)
-    w = left[:, np.argmin(np.abs(others - values[k]))]
+    left_values, left = np.linalg.eig(J.T)
+    w = left[:, np.argmin(np.abs(left_values - values[k]))]
     if values[k] == 0:  # for example of a joint that moves freely
         return Fastest(0j, equation.plant.dynamics.joint_names[int(np.argmax(np.abs(x[:n])))], BODIES)
     part = np.abs(w * x)
     joint = int(np.argmax(part[:n] + part[n : 2 * n]))
-    with np.errstate(all="ignore"):  # all times wᴴ x, which is 0 for a defective λ, as with critical damping
+    with np.errstate(all="ignore"):  # λ_k wᴴ x: wᴴ x is 0 for a defective λ, for example at critical damping
         parts = {name: w[n : 2 * n] @ (A @ x) for name, A in _accelerations(equation, t, y, held).items()}
-        kinematic = w[:n] @ (J[:n] @ x)  # q' = v, half of every oscillation
+        kinematic = w[:n] @ (J[:n] @ x)  # contribution of q' = v, which has no source
         parts[BODIES] = values[k] * (w @ x) - kinematic - sum(parts.values())
         source = max(reversed(parts), key=lambda name: np.nan_to_num(abs(parts[name]), nan=0.0))
     return Fastest(complex(values[k]), equation.plant.dynamics.joint_names[joint], source)

@@ -19,7 +19,7 @@ from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.validate import numbers, one_state
+from robot_dyn.foundations.validate import JointValues, numbers, one_state
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import without_rounding
@@ -86,9 +86,9 @@ class Linearisation(Answer, Value):
 
 def linearise(
     plant: Plant | Dynamics,
-    q: ArrayLike,
-    v: ArrayLike | None = None,
-    u: ArrayLike | None = None,
+    q: JointValues,
+    v: JointValues | None = None,
+    u: JointValues | None = None,
     *,
     z: ArrayLike | None = None,
     t: float | None = None,

@@ -1,7 +1,7 @@
 """The choice of the engine of a run; the interpreted one is built in, any other is a plug-in.
 
-ENGINES has the function of each plug-in as "module:function". It is called as (setup, seen) and imported on first use,
-so that a run depends on the protocol `Engine` and not on machine code.
+ENGINES maps each plug-in to its function, "module:function", with the arguments (setup, min_evaluations). The function
+is imported on first use, so that a run depends on the protocol `Engine` and not on machine code.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from robot_dyn.simulation.setup.setup import Setup
 ENGINES = {"compiled": "robot_dyn.simulation.compiled.choice:choose"}
 
 
-def choose(setup: Setup, seen: float = 0) -> Engine:
+def choose(setup: Setup, min_evaluations: float = 0) -> Engine:
     """Return the engine that runs a setup.
 
     Args:
         setup: The setup to run.
-        seen: Lower bound of the number of evaluations, without companion runs.
+        min_evaluations: Lower bound of the number of evaluations, without companion runs.
 
     Raises:
         TraceError: If engine is "compiled" and a part cannot be compiled; names the part.
@@ -31,4 +31,4 @@ def choose(setup: Setup, seen: float = 0) -> Engine:
         return interpreted_engine(setup)
     if setup.engine == "auto" and (parts := setup.undeclared):  # a trace might miss changes in them
         return interpreted_engine(setup, " ".join((named(parts[0][0]), parts[0][1])))
-    return resolve_name(ENGINES["compiled"])(setup, seen)
+    return resolve_name(ENGINES["compiled"])(setup, min_evaluations)

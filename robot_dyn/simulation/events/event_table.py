@@ -13,8 +13,8 @@ from robot_dyn.simulation.dynamics.loop_state import Function, Lanes, LoopConfig
 from robot_dyn.simulation.events.detection import coordinate_nears, enclosure, enclosure_of_position, function_nears
 
 SCANS = 11  # evaluations of each function of the table in a step that is scanned, see `first_event`
-ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
-NEAR = 1e-4  # of a step: for the slope of a function
+ROUNDING = 64 * np.finfo(float).eps  # relative to the coefficients of a polynomial
+NEAR = 1e-4  # fraction of a step: half the width of the central difference for a slope
 
 
 class EventTable(NamedTuple):
@@ -24,17 +24,17 @@ class EventTable(NamedTuple):
     functions are first those of thresholds of the actuation, then user-defined events.
 
     Attributes:
-        rows: Entry of y, and then of the values of the functions, (E + G,).
-        levels: The level of each, (E + G,).
+        rows: Index in y for each coordinate, in `values` for each function, (E + G,).
+        levels: Level of each coordinate and function, (E + G,).
         sides: 1 where the value is not below its level, −1 where it is not above, (E + G,).
         is_rate: True if the coordinate is the rate of that entry, (E,).
         active: True if the coordinate may cause an event, (E,).
         thresholds, guards: Number of thresholds of coordinates, and of guards; E is their sum.
         zeroed: Entries of y that are set to 0 after each step: only their rates matter.
-        functions: Function for `evaluate` that writes the F values.
+        functions: Function for `evaluate` that writes `values`; None if there is none.
         user_defined: Number of user-defined events, which are scanned in each step.
-        values: The latest values, (F, 1).
-        previous, change: Values at the start of a step, and their change in the step before, (F,).
+        values: The latest F values of the functions, (F, 1).
+        previous, change: Values at the start of a step, and how much they changed in the step before, (F,).
         rounding, slack: Rounding of each coordinate near its level, and the distance beyond it that counts, (E,).
         coefficients, stack: Work arrays for `bernstein`.
         scanned: Distances of the functions from their levels within a step, times their sides, (G, SCANS).

@@ -17,16 +17,16 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
 
-_REVERSALS = 10  # least number in a row; well-sampled motion has fewer
-_PART = 0.02  # of the joint's largest actuation so far: smaller changes are noise
-_LEAST = 1e-6  # of the largest actuation of any joint so far
+_REVERSALS = 10  # smallest number in a row that is reported; well-sampled motion has fewer
+_PART = 0.02  # fraction of the joint's largest actuation so far; smaller changes are noise
+_LEAST = 1e-6  # fraction of the largest actuation of any joint so far; smaller changes are noise
 _OTHER = 10.0  # ratio of amplitudes above which the smaller of two episodes is not reported
 
 
 @final
 @dataclass
 class Episode:
-    """One or more rows of reversals: first `start`, total `duration`, u alternating by ± `amplitude`."""
+    """Chatter of a joint: start of its first row of reversals, total duration, and amplitude of u in these rows."""
 
     start: float
     duration: float
@@ -39,7 +39,7 @@ class Chatter(NamedTuple):
     Attributes:
         t: Time of the latest tick, (1,), in [s].
         ticks: Number of ticks, (1,).
-        u: Actuation at the latest three ticks, tick k at index k mod 3, (3, n, W); nan until there are three.
+        u: Actuation at the latest three ticks, tick k at index k mod 3, (3, n, W); nan where no tick has been yet.
         reversals: Reversals in a row so far, (n, W).
         streak: Start, duration and amplitude of the current row, (3, n, W).
         going: Number of runs with a current row, (n,).

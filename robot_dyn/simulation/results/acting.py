@@ -38,6 +38,7 @@ def _edits(robot: Robot) -> Iterator[str]:
     yield from (f"payload {payload.mass:g} kg on {payload.frame}" for payload in edits.payloads)
     if edits.mass_scale != 1:
         yield f"mass_scale {edits.mass_scale:g}"
+    yield from (f"mass_scale {factor:g} of {link}" for link, factor in edits.mass_scales)
     yield from (f"mass {mass:g} kg of {link}" for link, mass in edits.masses)
     yield from (f"inertia of {link}" for link, _ in edits.inertias)
     if any(value for _, value in edits.armature):

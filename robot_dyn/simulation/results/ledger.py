@@ -16,7 +16,7 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
-_OPEN = 1e-3  # largest residual that closes, relative to the energy exchanged
+_OPEN = 1e-3  # largest residual of a ledger that closes, relative to the energy exchanged
 _ROUNDING = 1e-12  # of the energies whose difference is the residual
 # Residuals relative to the energy exchanged: over 150 random scenes they were at most 10 times the estimated error of
 # q relative to the motion. A far larger one contradicts the estimate.
@@ -31,10 +31,10 @@ class Ledger(Value):
     Attributes:
         kinetic: K.
         potential: Potential energy of gravity and of the conservative effects.
-        work: Work done up to each sample by the control and by each other effect, by name.
+        work: Work done up to each sample by the control and by each effect, by name.
         kinetic_peak: Largest known K between the samples.
         stored: Energy stored in effects with states, by name; their work includes it.
-        cause: Reason why the ledger does not close; None if it closes, or if the reason was not searched for.
+        cause: Reason why the ledger does not close; None if it closes, or if no reason was sought.
     """
 
     kinetic: Annotated[np.ndarray, Layout(("m",), absent=True)]

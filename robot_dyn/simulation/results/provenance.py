@@ -150,7 +150,7 @@ def _edited(robot: Robot, edits: Any) -> Robot:
     """Return the robot with the edits of `Edits.as_json`, checked as usual; locks come last, they remove joints."""
     payloads = [Payload(**fields) for fields in edits["payloads"]]
     armature, lock = dict(edits["armature"]), dict(edits["lock"])
-    links = {key: dict(edits[key]) for key in ("masses", "inertias") if edits.get(key)}
+    links = {key: dict(edits[key]) for key in ("mass_scales", "masses", "inertias") if edits.get(key)}
     free = robot.with_(
         gravity=edits["gravity"], armature=armature, payload=payloads, mass_scale=edits["mass_scale"], **links
     )

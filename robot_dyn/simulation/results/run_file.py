@@ -51,9 +51,9 @@ def _check(run: TrajectoryData, members: Members) -> None:
         raise StoreError(f"member {shorten(members.not_finite[0])!r} of a run that did not diverge contains nan or inf")
     for name, t in (("t", run.t), *((f"wrenches/{link}", F[:, 0]) for link, F in run.wrenches.items())):
         if not are_times(t) or len(t) < len(run.t):
-            raise StoreError(f"the times of member {shorten(name)!r} are not those of a run, or do not grow")
+            raise StoreError(f"the times of member {shorten(name)!r} are too few, negative, too large or decreasing")
     if run.error is not None and not are_times(run.error.t):
-        raise StoreError("the times of member 'error/t' are not those of a run, or do not grow")
+        raise StoreError("the times of member 'error/t' are negative, too large or decreasing")
     if run.power.keys() != run.ledger.work.keys():
         raise StoreError("members of 'power' and of the ledger's 'work' have different names")
     if run.desired is not None and run.tracking_error is not None and run.tracking_error.shape != run.desired.shape:

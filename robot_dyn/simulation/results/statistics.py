@@ -25,6 +25,8 @@ class Statistics:
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Names of the user-defined parts of the setup, which each run calls.
+        one_by_one: Runs of a batch that were made one by one, not in lock step.
+        one_by_one_s: Time of these runs, in [s].
     """
 
     method: str
@@ -39,6 +41,8 @@ class Statistics:
     companion_evaluations: int = 0
     companion_runs: int = 0
     user_code: str = ""
+    one_by_one: int = 0
+    one_by_one_s: float = 0.0
 
 
 @final

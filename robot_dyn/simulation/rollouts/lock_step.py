@@ -87,6 +87,7 @@ class Tiles:
         self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
         self.positions = [start_position() for _ in range(tiles)]
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
+        self.one_by_one_s = 0.0
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Record:
         """Run all tiles, one thread for each; Ctrl-C or an error of `on_progress` ends them at their next step."""
@@ -122,9 +123,10 @@ class Tiles:
         runs = np.flatnonzero((passed | (self._implausible() & as_simulated))[:B])
         records: list[Single | None] = [None] * len(runs)
         if len(runs) and not self.stop[0]:
-            part = len(runs) / B
+            part, began = len(runs) / B, perf_counter()
             levels = self.levels.of_runs(runs)
             records, _ = singles(self.batch.some(runs), levels, threads, lambda t: report((1 - part) * end + part * t))
+            self.one_by_one_s = perf_counter() - began
         return dict(zip(runs.tolist(), records, strict=True))
 
     def _implausible(self) -> np.ndarray:
@@ -209,7 +211,8 @@ class Tiles:
         instants = self.steps // self.apart if self.apart > 1 else 0
         result = Record(
             _compiled(setup), t, columns, outcomes, self._steps(ended), np.repeat(self.evaluations, LANES)[:B],
-            Statistics(setup.method.name, step, self.steps, most, perf_counter() - began, engine=label),
+            Statistics(setup.method.name, step, self.steps, most, perf_counter() - began, engine=label,
+                       one_by_one=len(alone), one_by_one_s=self.one_by_one_s),
             observed(self.observations, self.levels, alone, instants)[:B],
         )  # fmt: skip
         for run, single in repeated.items():

@@ -91,12 +91,15 @@ def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object
             x[:, 0] = batch.q0 if name == "q" else batch.v0
     label = f"{engine.label}, {B} run{'s' * (B > 1)} one after the other on each thread"
     step = 0.0 if setup.method.controls_error else setup.duration_s / setup.steps
+    wall = perf_counter() - began
     steps, evaluations = (
         max((getattr(x, name) for x in begun.values()), default=0) for name in ("steps", "evaluations")
     )
     result = Record(
         setup, t, recorded, [Outcome(Reason.INTERRUPTED, 0.0)] * B, np.zeros(B, np.int64), np.zeros(B, np.int64),
-        Statistics(setup.method.name, step, steps, evaluations, perf_counter() - began, engine=label),
+        Statistics(
+            setup.method.name, step, steps, evaluations, wall, engine=label, one_by_one=len(begun), one_by_one_s=wall
+        ),
         observed([starts], levels, {i: record.observation for i, record in begun.items()}),
     )  # fmt: skip
     for i, record in begun.items():

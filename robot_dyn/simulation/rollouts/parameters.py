@@ -63,7 +63,7 @@ def parameters(what: Setup | Plant | Dynamics) -> Parameters:
     """Return the parameters that `rollouts` can vary: names, values, units and shapes.
 
     They are coefficients of effects, gains of the controller, gravity, payloads, armature, the factor on all masses,
-    mass and inertia of each link, and the same for the controller's models. Its `repr` is the table that
+    mass, inertia and mass scale of each link, and the same for the controller's models. Its `repr` is the table that
     `robot-dyn parameters` prints, `to_json()` the document of its `--json`.
 
     Args:

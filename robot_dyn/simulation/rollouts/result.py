@@ -28,7 +28,7 @@ from robot_dyn.simulation.rollouts.run_file import write_rollouts
 from robot_dyn.simulation.rollouts.table import columns, samples
 from robot_dyn.simulation.run.outcome import Reason
 
-_SHARED = ("joint_names", "t", "statistics", "sources", "metadata", "setup", "uncut", "saved", "numbers")  # by all runs
+_SHARED = ("joint_names", "t", "statistics", "sources", "metadata", "setup", "uncut", "comparison", "saved", "numbers")
 _MOST_DRAWN = 2000  # largest number of runs for the quantiles in a notebook
 _QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
@@ -55,7 +55,8 @@ class Rollouts(RolloutsData):
         metadata: Texts common to all runs, as in `Trajectory`, without `varied`.
         varied: Values that differ from run to run, by name, (B, n).
         setup: Setup shared by all runs; None for runs read from a file.
-        uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
+        uncut: Names of the thresholds at which steps do not end, with `uncut=True`.
+        comparison: Differences between some uncut runs and the same runs with steps that end at thresholds.
         q0, v0: Initial positions and velocities, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps except for u of continuous control
             (see `remarks`).
@@ -185,7 +186,8 @@ class Rollouts(RolloutsData):
         lines += about_the_robot(self)
         if self.uncut:
             levels = ", ".join(self.uncut)
-            lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one differs from simulate")
+            lines.append(f"uncut: steps do not end at {levels}; {self.comparison or 'no run was compared'}")
+        lines += self._one_by_one()
         if self.diverged.any():
             run = int(self.diverged.argmax())
             lines.append(f"run {run} diverged at t = {self.ended_s[run]:g} s; {self.outcome(run).text}")
@@ -199,6 +201,15 @@ class Rollouts(RolloutsData):
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it alone"
         lines.append(f"worst run: {self.worst}{again}")
         return "\n".join(escaped(line) for line in lines)
+
+    def _one_by_one(self) -> Iterator[str]:
+        """Yield how many runs were made one by one, and how long that took."""
+        ran = self.statistics
+        if ran.one_by_one and len(self) > 1:
+            all_so = ran.one_by_one_s == ran.wall_s  # no lock step before them
+            remedy = "" if all_so else ": they may pass a threshold; uncut=True lets steps pass it, in lock step"
+            times = f"{ran.one_by_one_s:.2g} s of {ran.wall_s:.2g} s"
+            yield f"{ran.one_by_one} runs were made one by one, in {times}{remedy}"
 
     def _early(self) -> str:
         """Return how many runs ended early, and why."""

@@ -24,15 +24,18 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.coefficients import rebuilt
 from robot_dyn.foundations.errors import QueryError, nearest, shown
-from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, truth
+from robot_dyn.foundations.validate import JointValues, choice, integer, joint_values, numbers, truth
 from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, Adaptive
 from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.compiled.cache import machine_code
 from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.results.acting import frame_of, rotors_of
-from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin
+from robot_dyn.simulation.results.provenance import edits_of_machine_code, joint_types, origin
+from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
 from robot_dyn.simulation.rollouts.result import Rollouts
@@ -48,28 +51,28 @@ RECORDS = ("q", "v", "u", "energy", "work")
 @takes_options
 def rollouts(
     what: Setup | Plant | Dynamics,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     *,
     vary: Mapping[str, ArrayLike] | None = None,
     record: Iterable[str] = ("q", "v"),
-    cuts: bool = True,
+    uncut: bool = False,
     numbers: ArrayLike | None = None,
     threads: int | None = None,
     max_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Rollouts:
-    """Run a plant or a robot from many starts, or a setup with other options.
+    """Run a plant, a robot or a setup many times: from many starts, or with many values of its parameters.
 
     Each run equals that of `simulate`, to rounding. With an explicit, Gauss or Rosenbrock method of fixed step, for
     example `method="RK4"`, and with time stepping, the runs are in lock step in machine code. Runs that may pass a
     threshold (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each
     thread, with steps that end there, which takes a few milliseconds a run.
 
-    All runs are one after the other on each thread if the method chooses its steps, as the default does. With a fixed
-    step they are, too, if dry friction, rigid stops, switched payloads or events end steps, or if samples lie between
-    the ends of steps that may be cut.
+    Otherwise each thread executes its runs one after the other. This holds for methods that choose their steps, such
+    as the default. With a fixed step it holds if dry friction, rigid stops, switched payloads or events end steps, or
+    if steps may be cut and samples lie within them.
 
     Args:
         what: A plant, a robot or a setup.
@@ -79,16 +82,18 @@ def rollouts(
             gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
             of a kind, "external_wrench 2.wrench"; "gravity", (B, 3); mass in [kg] and centre of mass of a payload on a
             link, "payload_mass:tool0" and "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and
-            inertia of a link, see `Robot.with_`, "link3.mass" and "link3.inertia", (B, 3, 3). Models of controllers
+            inertia of a link, see `Robot.with_`, "link3.mass" and "link3.inertia", (B, 3, 3), or a factor on both,
+            "link3.mass_scale". Models of controllers
             have separate values: "model.gravity", ….
         record: Quantities to record at the samples: some of "q", "v", "u", "energy", "work". Only `simulate` records
             states of effects and controllers.
-        cuts: False for runs in lock step whose steps do not end at thresholds; the summary then names these. Such runs
-            are faster, with the error of a step that passes a threshold.
-        numbers: Numbers of the runs, which determine their noise, (B,); by default 0 to B − 1. The bits of a run depend
+        uncut: True to take whole steps across thresholds, in lock step: as fast as runs without thresholds, but with
+            the error of a step across one. At most 64 runs, drawn at random, are repeated with steps that end at
+            thresholds: see `Rollouts.comparison`.
+        numbers: Number of each run, which determines its noise, (B,); by default 0 to B − 1. The bits of a run depend
             on its number, start and parameters, not on the other runs.
         threads: Number of threads; None for all processors.
-        max_bytes: Refuse to record more than this.
+        max_bytes: Largest size of the record, in bytes.
         on_progress: Called with the mean time that the runs have reached, in [s], some ten times a second; with a
             record period of 0 it grows as tiles of 64 runs end.
         **options: Options of `simulate`, except `estimate_error` and `accuracy`, which have no effect here: no error is
@@ -114,19 +119,21 @@ def rollouts(
     max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1)
     if not setup.method.plain:
         raise QueryError(
-            f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
-            f" {setup.method.name}: give method='RK4' and its step_s; simulate takes any method"
+            f"rollouts do not support {setup.method.name}, only explicit, Gauss and Rosenbrock methods and those that"
+            f" choose their steps: give method='RK4' and its step_s; simulate takes any method"
         )
     if vary is not None and not (isinstance(vary, Mapping) and all(isinstance(name, str) for name in vary)):
         raise QueryError(f"vary must give values by name, such as {{'kp': …}}, got {shown(vary)}")
     batch = batch_of(setup, q0, v0, vary or {}, record, numbers)
-    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), max_bytes, on_progress)
+    uncut, count = truth("uncut", uncut), thread_count(threads)
+    runs = run_batch(batch, batch.thresholds, uncut, count, max_bytes, on_progress)
+    return replace(runs, comparison=_compared(batch, runs, count, max_bytes)) if runs.uncut else runs
 
 
 def batch_of(
     setup: Setup,
-    q0: ArrayLike | None,
-    v0: ArrayLike | None,
+    q0: JointValues | None,
+    v0: JointValues | None,
     vary: Mapping[str, ArrayLike],
     record: Iterable[str],
     numbers: ArrayLike | None = None,
@@ -157,11 +164,11 @@ def _numbers(values: ArrayLike, count: int) -> np.ndarray:
     """Return numbers of runs, (B,)."""
     array = numbers("numbers", values, ("B",), least=0)
     if array.shape != (count,) or (array != np.floor(array)).any() or array.max() > LARGEST_NUMBER:
-        raise QueryError(f"numbers: give a whole number of each of the {count} runs, 0 to {LARGEST_NUMBER:g}")
+        raise QueryError(f"numbers: give a whole number for each of the {count} runs, 0 to {LARGEST_NUMBER:g}")
     return array.astype(np.int64)
 
 
-def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
+def stepping_groups(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
     """Return the runs of a batch in groups by stepping strategy, with their thresholds.
 
     A batch in which some runs have thresholds detects their passage. Its other runs form a separate group, whose bits
@@ -170,30 +177,30 @@ def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
     runs, passed = np.arange(len(batch)), batch.thresholds
     if passed is None or passed.some.all():
         return [(runs, passed)]
-    with_some = runs[passed.some]
-    return [(with_some, passed.of(with_some)), (runs[~passed.some], None)]
+    with_thresholds = runs[passed.some]
+    return [(with_thresholds, passed.of(with_thresholds)), (runs[~passed.some], None)]
 
 
 def run_batch(
-    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, max_bytes: int,
+    batch: Batch, passed: Thresholds | None, uncut: bool, threads: int, max_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
     """Return the rollouts of a batch with thresholds `passed`."""
     setup, why = batch.setup, batch.why_one_by_one
-    if not cuts and why:
-        raise QueryError(f"cuts=False: {why}, so the runs are not in lock step; leave it out")
+    if uncut and why:
+        raise QueryError(f"uncut: {why}, so the runs are not in lock step; leave it out")
     check_batch(setup, len(batch), sum(batch.sizes.values()), max_bytes)
     cut = (
         passed is not None or setup.finds_events
     )  # samples are then interpolated within steps, which lock step does not support
-    if why or (cuts and cut and not setup.samples_on_steps):
+    if why or (not uncut and cut and not setup.samples_on_steps):
         record = one_by_one(batch, threads, on_progress)
     else:
         build = partial(
             machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras,
-            swept=tuple(batch.sweep), detects=passed is not None and cuts,
+            swept=tuple(batch.sweep), detects=passed is not None and not uncut,
         )  # fmt: skip
-        record = Tiles(batch, checked(setup, build), passed if cuts else None).run(threads, on_progress)
+        record = Tiles(batch, checked(setup, build), None if uncut else passed).run(threads, on_progress)
     columns, sources = record.columns, tuple(setup.equation.sources)
     energy, work = columns.get("energy"), columns.get("work")
     metadata = frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | origin(setup.plant.dynamics)
@@ -205,11 +212,29 @@ def run_batch(
         ends=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
         metadata=metadata | setup.metadata, varied=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
-        observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,
+        observed=record.observed, numbers=batch.numbers, uncut=passed.names if uncut and passed is not None else (),
     )  # fmt: skip
 
 
-def _setup(what: Setup | Plant | Dynamics, q0: ArrayLike | None, options: Mapping[str, Any]) -> Setup:
+def _compared(batch: Batch, runs: Rollouts, threads: int, max_bytes: int) -> Comparison | None:
+    """Compare uncut runs with cut runs from the same starts; None after Ctrl-C."""
+    places = drawn(len(batch))
+    if runs.stopped.any():
+        return None
+    some = batch.some(places)
+    cut = run_batch(some, some.thresholds, False, threads, max_bytes)
+    if cut.stopped.any():
+        return None
+    kinds = joint_types(runs)
+    recorded = {name: getattr(runs, name) for name in ("q", "v", "u", "kinetic", "potential")}
+    units = {name: joint_units(name, kinds) if name in "qvu" else SAMPLED[name].unit for name in recorded}
+    quantities = {name: x[places] for name, x in recorded.items() if x is not None}
+    others = int((runs.diverged[places] != cut.diverged).sum())
+    repeated = {name: getattr(cut, name) for name in quantities}
+    return Comparison(len(places), len(batch), others, tuple(differences(quantities, repeated, units)))
+
+
+def _setup(what: Setup | Plant | Dynamics, q0: JointValues | None, options: Mapping[str, Any]) -> Setup:
     """Return the setup of all runs; for a plant or robot, with the first start."""
     start = {}
     if not isinstance(what, Setup):
@@ -246,7 +271,7 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
 
 
 def _check(setup: Setup, parameter: Parameter, value: np.ndarray) -> None:
-    """Build the part of a parameter with a value, to raise an error for an invalid one."""
+    """Build the part that has a parameter with the value, which raises an error if the value is invalid."""
     place, key = parameter.part, parameter.key
     if key.startswith("inertia "):
         Edits().with_((), inertias={key.partition(" ")[2]: value})

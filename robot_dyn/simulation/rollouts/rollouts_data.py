@@ -18,6 +18,7 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
+from robot_dyn.simulation.rollouts.comparison import Comparison
 from robot_dyn.simulation.rollouts.parameters import parts_of_run
 from robot_dyn.simulation.rollouts.reasons import Samples, reason_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
@@ -61,6 +62,7 @@ class RolloutsData(RunData):
     observed: Observed
     setup: Annotated[Setup | None, NOT_STORED] = None
     uncut: tuple[str, ...] = ()
+    comparison: Comparison | None = None
     saved: Overview | None = None
     numbers: Annotated[np.ndarray | None, NOT_STORED] = None
 

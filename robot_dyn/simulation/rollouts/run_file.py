@@ -14,7 +14,7 @@ from robot_dyn.simulation.results.provenance import packed
 from robot_dyn.simulation.results.run_file import REMEDY, RUN, RunFileError, are_times, version_remedy
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 
-FORMAT = "rollouts 7"
+FORMAT = "rollouts 8"
 
 Runs = TypeVar("Runs", bound=RolloutsData)
 
@@ -28,28 +28,28 @@ def write_rollouts(runs: RolloutsData, path: Path, overview: Overview) -> Path:
 
 
 def _check(runs: RolloutsData, members: Members) -> None:
-    """Raise a StoreError if the arrays of rollouts are inconsistent, or their numbers cannot belong to runs."""
+    """Raise a StoreError if the arrays of rollouts are inconsistent, or their values are impossible for runs."""
     if members.lengths.get("n", len(runs.joint_names)) != len(runs.joint_names):
-        raise StoreError(f"arrays are of {members.lengths['n']} joints, 'joint_names' of {len(runs.joint_names)}")
+        raise StoreError(f"arrays have {members.lengths['n']} joints, 'joint_names' has {len(runs.joint_names)}")
     if not are_times(runs.t) or not len(runs.t):
-        raise StoreError("the times of member 't' are not finite, or do not grow")
+        raise StoreError("the times of member 't' are missing, negative, too large or decreasing")
     if not all(map(are_times, runs.ended_s[:, None])):
-        raise StoreError("the times in 'ends' are not those of runs")
-    numbered = (number for remark in (() if runs.saved is None else runs.saved.remarks) for number in remark.runs)
+        raise StoreError("a time in 'ends' is negative, too large or not finite")
+    run_numbers = (number for remark in (() if runs.saved is None else runs.saved.remarks) for number in remark.runs)
     if len(runs.observed.levels) != runs.observed.limits.shape[1]:
-        raise StoreError("'observed/levels' are not those of member 'observed/limits'")
-    if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
-        raise StoreError(f"'saved' is about a run that is not one of the {len(runs)}")
+        raise StoreError("members 'observed/levels' and 'observed/limits' have different lengths")
+    if not all(0 <= number < len(runs) for number in (*run_numbers, 0 if runs.saved is None else runs.saved.worst)):
+        raise StoreError(f"'saved' names a run outside 0 to {len(runs) - 1}")
     if len(runs.ends) != len(runs.q0):
-        raise StoreError(f"'ends' is of {len(runs.ends)} runs, not of {len(runs.q0)}")
+        raise StoreError(f"'ends' has {len(runs.ends)} runs, 'q0' has {len(runs.q0)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):
         raise StoreError("members 'work/…' and 'sources' have different names")
-    whole = ~(runs.diverged | runs.stopped)[:, None] & (
+    is_complete = ~(runs.diverged | runs.stopped)[:, None] & (
         (runs.t < runs.ended_s[:, None]) | (runs.ended_s >= runs.t[-1])[:, None]
     )
     for name in ("q", "v", "u", "kinetic", "potential"):
         array = getattr(runs, name)
-        if array is not None and not np.isfinite(array[whole]).all():
+        if array is not None and not np.isfinite(array[is_complete]).all():
             raise StoreError(f"member {name!r} of a run that did not diverge contains nan or inf")
 
 

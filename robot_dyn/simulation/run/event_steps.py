@@ -148,7 +148,8 @@ class EventSteps:
     def _failure(self, ended: Ended, t: float, y: np.ndarray) -> Outcome:
         """Return the outcome if error control has failed to take a step."""
         if ended is Ended.FAST:
-            return Outcome(Reason.IMPLAUSIBLE_SPEED, t, facts={"limit": 1e6})
+            joint = self.state.equation.fastest_joint(y)
+            return Outcome(Reason.IMPLAUSIBLE_SPEED, t, joint, facts={"limit": 1e6})
         if (error := self.handler.error) is not None:
             return Outcome(Reason.CANNOT_EVALUATE, t, facts={"error": str(error)})
         reason = Reason.RATE_NOT_FINITE if ended is Ended.NOT_FINITE else Reason.STEP_BELOW_FLOAT_SPACING

@@ -163,7 +163,7 @@ _SENTENCES: Mapping[Reason, Parts] = {
     Reason.CONTROL_LOOP_UNSTABLE: line_parts(RemarkKind.UNSTABLE),
     Reason.STEP_TOO_LONG: line_parts(RemarkKind.TOO_LONG),
     Reason.IMPLAUSIBLE_SPEED: (
-        (*TOO_FAST, "a joint moves faster than {limit:g} rad/s or m/s: check gains and effects"),
+        (*TOO_FAST, "{joint} moves faster than {limit:g} rad/s or m/s: check gains and effects"),
         "; the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
     ),
     Reason.ENERGY_WITHOUT_SOURCE: ("energy grows without a source", _FASTEST, _PERIOD),

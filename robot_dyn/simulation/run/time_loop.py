@@ -3,7 +3,7 @@
     for each segment:  tick;  for each step:  share, sample, y⁺ = step(t, y), observe, check the energy
 
 Plain functions of arrays: they run in Python with Python functions of the state equation, or as machine code with
-addresses of these. Python judges a doubtful step of a single run; in lock step, a run that has ended is nan.
+addresses of these. Python reviews a doubtful step of a single run; in lock step, the state of an ended run is nan.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robot_dyn.simulation.run.philox import draw
 from robot_dyn.simulation.run.recording import Loop, observe_step, sample, share
 
 WATCHED = 64  # steps between energy checks
-RUNAWAY = 1e3  # times the energy at the start and the work: a larger gain of energy has no source
+RUNAWAY = 1e3  # limit of the ledger's residual, relative to the energy at the start plus the work
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
@@ -84,13 +84,13 @@ def begin_lanes(functions: Functions, loop: Loop) -> None:
 def apply_tick(functions: Functions, loop: Loop, t: float, p: Array, number: int) -> bool:
     """Apply a tick: write the torque for the zero-order hold and the next states of the controller.
 
-    Noise is drawn by the number of the period: all ticks of a period get the same.
+    Noise depends on the number of the period: it is the same at all ticks of a period.
 
     Args:
         functions: Functions of the state equation.
         loop: The loop.
         t: Time of the tick, in [s].
-        p: Numbers of the segment for evaluations at the time of the tick.
+        p: Parameters of the segment at the time of the tick.
         number: Number of the tick, from 1.
 
     Returns:
@@ -111,12 +111,12 @@ def apply_tick(functions: Functions, loop: Loop, t: float, p: Array, number: int
 
 
 def changes_torque(config: LoopConfig, tick: int) -> bool:
-    """Return True if the torque of a sampled controller changes at a tick; its number is 0 for none."""
+    """Return True if the torque of a sampled controller changes at this tick; the number 0 means no tick."""
     return tick > 0 and (tick - 1) % config.instants == config.acting
 
 
 def record(functions: Functions, loop: Loop, t: float, at_end: bool) -> None:
-    """Store the state before a step: for companions at each `every`-th step, and as a sample where one is due."""
+    """Store the state before a step: for companions every `every` steps, and as a sample where one is due."""
     config, position, lanes = loop.config, loop.position, loop.lanes
     if config.every > 0 and position.step[0] % config.every == 0:
         if position.shareable[0] % config.thin == 0 or at_end:
@@ -131,7 +131,7 @@ def record(functions: Functions, loop: Loop, t: float, at_end: bool) -> None:
 
 
 def accept(lanes: Lanes, config: LoopConfig, t: float) -> bool:
-    """Replace y by y⁺ unless y⁺ is doubtful: too large, not finite, or of a step whose stages were not found.
+    """Replace y by y⁺ unless y⁺ is doubtful: too large, not finite, or of a step whose stages did not converge.
 
     Return False for a doubtful step of a single run; y is then unchanged. In lock step, the runs concerned end at t.
     """
@@ -150,7 +150,7 @@ def accept(lanes: Lanes, config: LoopConfig, t: float) -> bool:
 
 
 def count_step(loop: Loop) -> None:
-    """Count a step, which the budget allows."""
+    """Count a step, and take it off the budget."""
     loop.position.steps[0] += 1
     loop.position.budget[0] -= 1
 
@@ -158,7 +158,7 @@ def count_step(loop: Loop) -> None:
 def conserves_energy(functions: Functions, loop: Loop, t: float) -> bool:
     """Return False if energy grows without a source in a single run; in lock step, end the runs where it does.
 
-    E − E(0) − Σ W beyond a thousand times all the energy at the start is not an error of a step: steps are unstable.
+    Steps are unstable if E − E(0) − Σ W exceeds 1000 (1 J + |K(0)| + |V(0)| + Σ |W|).
     """
     lanes, config, ended = loop.lanes, loop.config, False
     evaluate(functions.energy, t, lanes.y, lanes.p, lanes.run_parameters, lanes.energies)
@@ -191,12 +191,12 @@ def erase_lanes(lanes: Lanes, config: LoopConfig) -> None:
 
 
 def observe_lanes(functions: Functions, loop: Loop, latest: Array, start: float, t: float, acted: bool) -> None:
-    """Observe q, v and the torque of a step; in lock step, a torque that changes between ticks every `apart` steps.
+    """Observe q, v and the torque of a step; in lock step, observe a continuous torque only every `apart` steps.
 
     Args:
         functions: Functions of the state equation.
         loop: The loop.
-        latest: The latest rate, with u for a single run.
+        latest: Rate at the end of the step, followed by u for a single run.
         start: Time at the start of the step, in [s].
         t: Time at its end, in [s].
         acted: True if the controller acted at the start.
@@ -221,7 +221,7 @@ def observe_lanes(functions: Functions, loop: Loop, latest: Array, start: float,
 
 
 def observe_torque(functions: Functions, loop: Loop, t: float, acted: bool) -> None:
-    """Observe the actuation of runs in lock step in the state reached."""
+    """Observe the actuation of runs in lock step at their current state."""
     lanes, observation = loop.lanes, loop.records.observation
     if observation.low.shape[1] == 0:
         return

@@ -34,15 +34,17 @@ def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_
     """
     if events and not finds_events:
         raise QueryError(
-            f"events: steps of {method.name} are not cut; take method='DOP853'"
+            f"events: steps of {method.name} cannot end at them; take method='DOP853'"
             if method.nonsmooth
-            else f"events: runs of more than {MOST_CUT} steps of {method.name} are not cut; take longer"
-            " steps, or method='DOP853'"
+            else f"events: in a run of more than {MOST_CUT} steps of {method.name}, steps cannot end at them; take"
+            " longer steps, or method='DOP853'"
         )
     _check_set_valued(plant, method, finds_events)
     _check_payloads(plant, method)
     if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
-        raise QueryError(f"{drives[0].name}: {method.name} takes no motors of a drive; take method='DOP853'")
+        raise QueryError(
+            f"{drives[0].name}: {method.name} cannot integrate the motors of a drive; take method='DOP853'"
+        )
 
 
 def check_start(
@@ -81,7 +83,7 @@ def check_model(plant: Dynamics, controller: Controller, q0: np.ndarray) -> None
             if name != plant_name:
                 raise QueryError(
                     f"the controller's model has the joint {name!r} where the plant has {plant_name!r}; lock the same"
-                    " joints of both"
+                    " joints in both"
                 )
     if controller.task_frame is not None:
         plant.placement(q0, controller.task_frame)  # raises an error for an unknown link
@@ -111,17 +113,17 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
         if effects and is_unsuited and not method.nonsmooth:
             raise QueryError(
                 f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {reason};"
-                " take method='DOP853', or 'MoreauJean with a step_s"
+                " take method='DOP853', or 'MoreauJean' with a step_s"
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
-        raise QueryError(f"{other[0].name}: has no law for {method.name}; take method='DOP853'")
+        raise QueryError(f"{other[0].name}: cannot be stepped by {method.name}; take method='DOP853'")
 
 
 def _check_payloads(plant: Plant, method: Method) -> None:
     """Check that a method can continue after a payload has been picked up or dropped."""
     for is_unsuited, reason in (
         (method.canonical, f"picking up or dropping a payload changes momenta, which {method.name} integrates"),
-        (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
+        (method.nonsmooth, f"steps of {method.name} do not end where the payload is picked up or dropped"),
     ):
         if plant.equation_of_motion.payloads and is_unsuited:
             raise QueryError(f"carried_payload: {reason}; take method='DOP853'")
@@ -135,7 +137,7 @@ def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:
         for force, torque in zip(plant.forces, torques, strict=True):
             _check_returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
             if any(threshold.of_actuation for threshold in force.thresholds(dynamics.n)):
-                raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
+                raise EffectError(f"{force.name}: only bounds may have thresholds of the actuation")
         u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
         u, reached = equation.applied(u, z)
         names = (type(plant.effects[k]).__name__ for k in equation.states)
@@ -185,4 +187,4 @@ def _check_returned(name: str, values: Any, n: int, row: str = "joint", *, error
         problem = str(failure)
     if problem:
         count = f"{n} {row}{'s' if n > 1 else ''}"
-        raise error(f"{name} returned {problem} for {count} at the start; it must be finite numbers of shape ({n},)")
+        raise error(f"{name} returned {problem} for {count} at the start; return finite numbers of shape ({n},)")

@@ -12,12 +12,12 @@ from inspect import Parameter, signature
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError, nearest
 from robot_dyn.foundations.signatures import takes
+from robot_dyn.foundations.validate import JointValues
 from robot_dyn.foundations.values import Caching, cached
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
@@ -40,7 +40,7 @@ takes_options = takes(
 """A decorator: the signature then shows each option with its default instead of `**options`."""
 
 
-def starts(q0: ArrayLike | None, v0: ArrayLike | None) -> dict[str, ArrayLike]:
+def starts(q0: JointValues | None, v0: JointValues | None) -> dict[str, JointValues]:
     """Return q0 and v0 as options, without those that are None."""
     return {name: x for name, x in (("q0", q0), ("v0", v0)) if x is not None}
 

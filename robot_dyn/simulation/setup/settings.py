@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from robot_dyn.control.controller import Controller
     from robot_dyn.simulation.setup.setup import Setup
 
-_MOST = 64  # numbers of an array that are written out; a longer array is written as a digest
+_MOST = 64  # entries of the longest array that is written out; a longer one is written as a digest
 
 Setting = tuple[str, str]  # name and value
 
 
 def settings_of(setup: Setup) -> dict[str, str]:
-    """Return the settings of a run without its start, by name; `float` restores each number exactly.
+    """Return the settings of a run by name, except its start; `float` restores each number exactly.
 
     Names are those of sweeps, for example "control.kp". If a name occurs several times, the later ones
-    are numbered. Parts that are not numbers, texts or references are given by their class.
+    are numbered. The value of a part that is not a number, text or reference is its class.
     """
     settings: dict[str, str] = {}
     for name, value in _all(setup):
@@ -68,7 +68,7 @@ def edits_by_name(robot: object) -> Iterator[Setting]:
     for payload in edits.payloads:
         yield f"payload on {payload.frame}", _payload(payload)
     yield "mass_scale", _text(edits.mass_scale)
-    for key in ("lock", "armature", "masses", "inertias"):
+    for key in ("lock", "armature", "mass_scales", "masses", "inertias"):
         yield from ((f"{key}.{name}", _text(np.array(value))) for name, value in getattr(edits, key))
 
 
@@ -102,9 +102,9 @@ def _numbers(name: str, part: Any, types: Any) -> Iterator[Setting]:
 
 def _payload(payload: Payload) -> str:
     inertia = np.array(payload.inertia)
-    turns = f", inertia {_text(inertia)} kg m²" if inertia.any() else ""
+    rotation = f", inertia {_text(inertia)} kg m²" if inertia.any() else ""
     place = f" at {', '.join(map(_number, payload.com))} m" if any(payload.com) else ""
-    return f"{_number(payload.mass)} kg{place}{turns}"
+    return f"{_number(payload.mass)} kg{place}{rotation}"
 
 
 def _is_plain(value: Any) -> bool:
@@ -115,7 +115,7 @@ def _is_plain(value: Any) -> bool:
 
 
 def _text(value: Any) -> str:
-    """Return the text of a text, a number or numbers; equal entries of a vector are written once."""
+    """Format a text, a number or an array; equal entries of a vector are written once."""
     if isinstance(value, str | int):
         return str(value)
     numbers = np.asarray(value, dtype=float)

@@ -17,7 +17,16 @@ from robot_dyn.effects.explanation import Explanation, explanation
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError, shown
-from robot_dyn.foundations.validate import LEAST_EXACT, choice, duration, instance, integer, one_state, truth
+from robot_dyn.foundations.validate import (
+    LEAST_EXACT,
+    JointValues,
+    choice,
+    duration,
+    instance,
+    integer,
+    one_state,
+    truth,
+)
 from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.integrator import Integrator
@@ -116,7 +125,7 @@ class Setup(Value, Caching):
     if TYPE_CHECKING:  # arguments that `__post_init__` converts to the types of the attributes
 
         def __init__(
-            self, plant: Plant, q0: ArrayLike, v0: ArrayLike | None = None, **options: Unpack[Options]
+            self, plant: Plant, q0: JointValues, v0: JointValues | None = None, **options: Unpack[Options]
         ) -> None: ...
 
     def __post_init__(self) -> None:

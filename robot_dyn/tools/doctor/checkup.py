@@ -293,6 +293,8 @@ def _reported(text: str, findings: Iterable[Finding]) -> bool:
 def _of_mesh(note: str) -> Finding:
     where, _, message = note.partition(": ")
     what, _, remedy = message.partition("; ")
+    if where == "file":
+        return Finding(Severity.NOTE, "shape_elsewhere", where, what, f"{remedy}; correct the paths")
     return Finding(Severity.WARNING, "shape_missing", where, what, remedy or "correct its address, or add its folder")
 
 

@@ -89,7 +89,7 @@ def _stated(robot: Any, kind: str) -> Any:
         name for name, limit in zip(robot.joint_names, np.broadcast_to(limits, robot.n), strict=True) if not limit
     ]:
         raise PlanError(
-            f"the file states a {kind} limit of 0 for {', '.join(map(repr, zero[:6]))}; give limits by joint,"
+            f"the file states the {kind} limit 0 for {', '.join(map(repr, zero[:6]))}; give limits by joint,"
             f" {kind}={{{zero[0]!r}: 10.0}}: joints left out have none"
         )
     return limits

@@ -8,10 +8,9 @@ from fractions import Fraction
 from time import perf_counter
 
 from flint import ctx
-from numpy.typing import ArrayLike
 
 from robot_dyn import Setup
-from robot_dyn.foundations import Ball, QueryError, duration, function, instance, integer, number
+from robot_dyn.foundations import Ball, JointValues, QueryError, duration, function, instance, integer, number
 from robot_dyn.tools.proof.enclosure.balls import NotProvenError
 from robot_dyn.tools.proof.enclosure.step import State, effort, proven_step
 from robot_dyn.tools.proof.hypotheses import assumed, start
@@ -29,8 +28,8 @@ def prove(
     until_s: float | None = None,
     bits: int = 100,
     *,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
+    q0: JointValues | None = None,
+    v0: JointValues | None = None,
     width_q: float = 0.0,
     width_v: float = 0.0,
     budget_s: float = 60.0,

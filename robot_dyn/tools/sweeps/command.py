@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from robot_dyn.cli import Force, Json, arguments, bar, command, say, say_json, to_stderr
+from robot_dyn.cli import Force, Json, arguments, command, say, say_json, to_stderr
 from robot_dyn.foundations import SweepError, nearest
 
 if TYPE_CHECKING:
@@ -30,6 +29,7 @@ def sweep(
     samples: str | None = None,
     design: str | None = None,
     seed: int | None = None,
+    uncut: bool = False,
     threads: int | None = None,
     cluster: str | None = None,
     job: str | None = None,
@@ -55,6 +55,7 @@ def sweep(
         samples (SAMPLES): Samples to keep: q, v or u of all runs, or 'samples("q", every=10)'.
         design: random, sobol, halton, latin, saltelli or grid.
         seed: Seed of the design.
+        uncut: Let steps pass thresholds, in lock step; 64 runs are compared with runs whose steps end there.
         threads: Threads of this process; by default one for each processor.
         cluster: Workers of Dask instead of threads: local:2, or tls://host:8786.
         job (3/16): Number of this job of an array, and number of jobs.
@@ -72,6 +73,7 @@ def sweep(
             raise SweepError("give the folder to fill with -o FOLDER")
         settings = {"runs": runs, "design": design, "seed": seed, "samples": samples}
         changes: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+        changes |= {"uncut": True} if uncut else {}
         stated = sw.from_scene(what, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
         result = _run(stated, output, options | {"chunk": chunk})
     else:
@@ -83,6 +85,7 @@ def sweep(
             raise SweepError(f"{what}: give the folder of a sweep, robot-dyn sweep {what} FOLDER")
         of_scenes = {
             "--runs": runs, "--vary": vary, "--samples": samples, "--design": design, "--seed": seed, "--chunk": chunk,
+            "--uncut": uncut or None,
         }  # fmt: skip
         if ignored := [name for name, value in of_scenes.items() if value not in (None, [], ())]:
             raise SweepError(
@@ -108,17 +111,8 @@ def sweep(
 
 
 def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
-    """Fill the folder, with a progress bar."""
+    """Fill the folder."""
     from robot_dyn.tools import sweeps as sw
 
     to_stderr(f"{stated.runs} runs, {stated.bytes_expected / 2**20:.3g} MiB on disk")
-    began, first = perf_counter(), [-1]
-    with bar(stated.runs, "preparing") as advance:
-
-        def on_progress(done: int, runs: int) -> None:
-            first[0] = done if first[0] < 0 else first[0]
-            rate = (done - first[0]) / max(perf_counter() - began, 1e-9)
-            pace = f", {rate:.3g} a second" if rate else ""  # of a folder that is complete nothing is run
-            advance(done, f"{done} of {runs} runs{pace}")
-
-        return sw.run(stated, folder, on_progress=on_progress, **options)
+    return sw.run(stated, folder, **options)

@@ -3,6 +3,7 @@
 sweep.json                   the specification
 design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
 rows/000123.parquet          a chunk; with more than 20 000 chunks rows/0004/080123.parquet
+uncut.json                   of an uncut sweep: some of its runs compared with runs whose steps end at thresholds
 samples/                     samples of runs, if they are kept
 
 Files are written completely or not at all. Two writers of one file do no harm: both write the same rows.
@@ -15,7 +16,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from time import time
@@ -23,17 +24,21 @@ from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, sync_folder, why
+from robot_dyn.simulation.rollouts.comparison import Comparison
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
 from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
 from robot_dyn.tools.sweeps.sweep import Sweep
+from robot_dyn.tools.sweeps.work import IN_LOCK_STEP, OneByOne
 
 MOST_FILES = 20_000  # largest number of files in a folder
 OLD_S = 86_400.0  # age in [s] after which an unfinished file is removed
-_MOST_TABLE = 2**34
+UNCUT = "uncut.json"
+_MOST_TABLE, _MOST_COMPARISON = 2**34, 2**20
 _SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
 _REMEDY = "run the sweep again, after removing this file"
 _AGAIN = "run the sweep into this folder again, which writes the file"
@@ -114,11 +119,21 @@ class Folder:
                 if time() - path.lstat().st_mtime > OLD_S:
                     path.unlink()
 
-    def write(self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
+    def write(
+        self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({}),
+        alone: OneByOne = IN_LOCK_STEP,
+    ) -> None:  # fmt: skip
         """Write a chunk, its samples first; raise a SweepError, with existing files unchanged, if that fails."""
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
         start, stop = self.of(chunk)
-        footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
+        footer = {
+            "sweep": self.digest,
+            "chunk": chunk,
+            "start": start,
+            "stop": stop,
+            "rows": digest_of([rows]),
+            "one_by_one": asdict(alone),
+        }
         try:
             footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
             stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.metadata)})
@@ -134,6 +149,29 @@ class Folder:
             raise SweepError(
                 f"chunk {chunk} (runs {start} to {stop - 1}): {error}; finished chunks are kept: run the sweep again"
             ) from None
+
+    def write_comparison(self, comparison: Comparison) -> None:
+        """Write the comparison of an uncut sweep; raise a SweepError if that fails."""
+        text = json.dumps({"sweep": self.digest, "comparison": asdict(comparison)}, indent=1, ensure_ascii=False)
+        save(self.path / UNCUT, lambda stream: stream.write(text.encode()), SweepError)
+
+    def comparison(self) -> Comparison | None:
+        """Return the comparison of an uncut sweep, None if it was not made; raise a SweepError if it is damaged."""
+        file, again = self.path / UNCUT, "remove this file, and run the sweep again, which compares the runs again"
+        if not file.exists():
+            return None
+        try:
+            stored = json.loads(read(file, _MOST_COMPARISON, SweepError, again))
+            if stored["sweep"] != self.digest:
+                raise SweepError(f"{file}: is of another sweep; {again}")
+            return TypeAdapter(Comparison).validate_python(stored["comparison"])
+        except (ValueError, TypeError, KeyError) as error:
+            raise SweepError(f"{file}: is not the comparison of an uncut sweep ({shown(error)}); {again}") from None
+
+    def one_by_one(self) -> OneByOne:
+        """Return how many runs of the present chunks were made one by one, and how long that took."""
+        chunks = np.flatnonzero(self.present()).tolist()
+        return sum((OneByOne(**self.footer(chunk)["one_by_one"]) for chunk in chunks), IN_LOCK_STEP)
 
     def read(self, chunk: int) -> Rows:
         """Return the rows of a chunk.

@@ -26,6 +26,7 @@ from robot_dyn.foundations import (
     target,
     truth,
 )
+from robot_dyn.simulation.rollouts.comparison import Comparison
 from robot_dyn.tools.sweeps import statistics
 from robot_dyn.tools.sweeps.export import KINDS, inputs_of, write_table
 from robot_dyn.tools.sweeps.expression import Expression, Truth
@@ -37,7 +38,7 @@ from robot_dyn.tools.sweeps.specification import specification
 from robot_dyn.tools.sweeps.statistics import Estimate
 from robot_dyn.tools.sweeps.statistics import text as number_text
 from robot_dyn.tools.sweeps.sweep import Sweep, heading
-from robot_dyn.tools.sweeps.work import Work
+from robot_dyn.tools.sweeps.work import OneByOne, Work
 
 _SHOWN = 5  # number of listed reasons
 _WORST = 10  # number of runs in a report
@@ -330,6 +331,16 @@ class SweepResult(Answer):
             count.update(dict.fromkeys(filter(None, texts.split("; ")), runs))
         return dict(count.most_common())
 
+    @reported
+    def comparison(self) -> Comparison | None:
+        """Return how the figures of uncut runs differ from those of cut ones, for some runs; None if not compared."""
+        return self.folder.comparison() if self.sweep.uncut else None
+
+    @reported
+    def one_by_one(self) -> OneByOne:
+        """Return how many runs were made one by one, not in lock step, and how long that took."""
+        return self.folder.one_by_one()
+
     def reasons(self) -> dict[str, int]:
         """Return the number of failed runs by reason, most frequent first."""
         return dict(Counter(self.folder.columns(("reason",))["reason"][self._failed].tolist()).most_common())
@@ -346,6 +357,14 @@ class SweepResult(Answer):
         yield ", ".join(f"{count} {name}" for name, count in (self.outcomes or {}).items())
         if len(processors := self.processors) > 1:
             yield f"rows of several processors, whose last bits may differ: {', '.join(processors)}"
+        if self.sweep.uncut:
+            compared = self.folder.comparison()
+            yield f"uncut: steps pass thresholds; {compared or 'not compared yet, sw.run(sweep, folder) does that'}"
+        alone = self.folder.one_by_one()
+        if alone.runs:
+            remedy = "; with uncut=True steps pass thresholds, in lock step" if alone.runs_s < alone.all_s else ""
+            times = f"{alone.runs_s:.2g} s of {alone.all_s:.2g} s over all threads"
+            yield f"{alone.runs} runs were made one by one, in {times}{remedy}"
         reasons, why = self.folder.columns(("reason", "why")).values()
         for reason, count in list(self.reasons().items())[:_SHOWN]:
             yield f"{count} times {reason}, first: {why[self._failed & (reasons == reason)][0]}"

@@ -6,8 +6,9 @@ on. The pilot measures processor time, because wall time on a busy machine would
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from shutil import disk_usage
 from time import perf_counter, process_time
@@ -19,7 +20,7 @@ from robot_dyn.codegen import thread_count
 from robot_dyn.foundations import SweepError, check_folder, file_path, function, instance, integer, needs
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools.sweeps.chunks import fill_by_threads, share_of
-from robot_dyn.tools.sweeps.folder import Folder, begin, folder_of, opened, read_design, write_design
+from robot_dyn.tools.sweeps.folder import UNCUT, Folder, begin, folder_of, opened, read_design, write_design
 from robot_dyn.tools.sweeps.imported import check_places, named
 from robot_dyn.tools.sweeps.result import SweepResult
 from robot_dyn.tools.sweeps.rows import FINISHED, RAISED
@@ -63,11 +64,15 @@ def run(
         cluster: Workers of Dask.distributed instead of threads: "local:2", the address of a scheduler, or a `Client`.
         job: Part of the chunks, for example "3/16" in the third of 16 jobs.
         chunk: Number of runs in a file; None for about 2 s of work, by a pilot of 64 runs. Constant for a folder.
-        on_progress: Function of the number of finished runs, and of all runs.
+        on_progress: Function of the number of finished runs, and of all runs; None for a progress bar if stderr is a
+            terminal.
 
     Raises:
         SweepError: If an argument is invalid, the folder contains another sweep, or a file cannot be written.
     """
+    if on_progress is None:
+        with _bar(sweep) as advance:
+            return run(sweep, folder, threads=threads, cluster=cluster, job=job, chunk=chunk, on_progress=advance)
     instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read_sweep(folder).sweep", error=SweepError)
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
     path, (number, jobs), work = file_path(folder, SweepError), share_of(job), Work(sweep)
@@ -83,7 +88,7 @@ def run(
 
     def report_progress() -> None:
         nonlocal last
-        if on_progress is not None and perf_counter() - last > _SCAN_S:
+        if perf_counter() - last > _SCAN_S:
             last = perf_counter()
             on_progress(min(int(store.present().sum()) * store.chunk, store.runs), store.runs)
 
@@ -103,9 +108,33 @@ def run(
 
             with client_of(cluster) as client:
                 fill_by_cluster(client, store, names_of(sweep), missing, report_progress)
+        if sweep.uncut and not len(store.missing()) and not (path / UNCUT).exists():
+            with suppress(Stopped):
+                store.write_comparison(work.compared())
     last = -_SCAN_S
     report_progress()
     return SweepResult(sweep, store)
+
+
+@contextmanager
+def _bar(sweep: Sweep) -> Iterator[Progress]:
+    """Yield a function that shows the finished runs, and their pace, in a progress bar on a terminal."""
+    if not sys.stderr.isatty() or not isinstance(sweep, Sweep):
+        yield lambda done, runs: None
+        return
+    from robot_dyn.cli import bar
+
+    began, first = perf_counter(), None
+    with bar(sweep.runs, "preparing") as advance:
+
+        def show(done: int, runs: int) -> None:
+            nonlocal first
+            first = done if first is None else first
+            rate = (done - first) / max(perf_counter() - began, 1e-9)
+            pace = f", {rate:.3g} a second" if rate else ""  # nothing runs if the folder is complete
+            advance(done, f"{done} of {runs} runs{pace}")
+
+        yield show
 
 
 def read_sweep(

@@ -27,7 +27,7 @@ from robot_dyn.tools.sweeps.sample_store import Samples
 from robot_dyn.tools.sweeps.sweep import Sweep
 
 FILE = "sweep.json"
-FORMAT = 5
+FORMAT = 6
 _MOST_BYTES = 2**26
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 _PLACE = "scene"  # its path may differ
@@ -60,7 +60,7 @@ class Specification(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    format: Literal[5]
+    format: Literal[6]
     scene: str
     setup: dict[str, Any]
     runs: Annotated[int, Field(gt=0, le=MOST_ROWS)]
@@ -70,6 +70,7 @@ class Specification(BaseModel):
     order: list[str]
     figures: dict[str, dict[str, Any]]
     samples: Samples | None
+    uncut: bool
     versions: dict[str, str]
     rows_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     chunk: Annotated[int, Field(gt=0)]
@@ -132,7 +133,16 @@ class Specification(BaseModel):
             }
             design, drawn = (rows, None) if self.design == "table" else (self.design, rows)
             return Sweep(
-                scene, self.runs, vary, sweep_figures, design, self.seed, self.samples, drawn=drawn, stated=stated
+                scene,
+                self.runs,
+                vary,
+                sweep_figures,
+                design,
+                self.seed,
+                self.samples,
+                uncut=self.uncut,
+                drawn=drawn,
+                stated=stated,
             )
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise SweepError(f"{folder / FILE}: is not the specification of a sweep ({error!r})") from None
@@ -170,6 +180,7 @@ def specification(sweep: Sweep, chunk: int) -> Specification:
         "order": list(sweep.vary),
         "figures": {name: figure.to_dict() for name, figure in sweep.figures.items()},
         "samples": None if sweep.samples is None else asdict(sweep.samples),
+        "uncut": sweep.uncut,
         "versions": versions(),
         "rows_sha256": sha256(np.ascontiguousarray(sweep.points.rows).tobytes()).hexdigest(),
         "chunk": chunk,

@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn import RobotDynError, Setup, parameters
-from robot_dyn.foundations import Answer, Block, QueryError, SweepError, Table, Value, integer, shorten, shown
+from robot_dyn.foundations import Answer, Block, QueryError, SweepError, Table, Value, integer, shorten, shown, truth
 from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
@@ -40,6 +40,8 @@ class Sweep(Answer, Value):
             each varying number.
         seed: Seed of the design.
         samples: Samples to keep: "q", or `samples("q", "u", every=100)`; none by default.
+        uncut: True for steps that pass thresholds, in lock step, see `rollouts`. The result compares figures of
+            64 runs, drawn at random, with those of runs whose steps end at thresholds.
         drawn: The rows of the design, (N, d), as stored in a folder; None to draw them by name and seed.
         stated: The setup as stated in a folder, if its reader has not named the function that returns it; else None.
 
@@ -55,6 +57,7 @@ class Sweep(Answer, Value):
     design: Any = "random"
     seed: int = 0
     samples: Samples | None = None
+    uncut: bool = False
     drawn: np.ndarray | None = None
     stated: Mapping[str, Any] | None = None
 
@@ -73,6 +76,7 @@ class Sweep(Answer, Value):
         set_(self, "figures", {name: figure(name, value) for name, value in figures.items()})
         set_(self, "seed", integer("seed", self.seed, most=2**63 - 1, error=SweepError))
         set_(self, "samples", samples_of(self.samples))
+        set_(self, "uncut", truth("uncut", self.uncut, error=SweepError))
         _ = self.points  # raises if the design cannot have N rows
         if self.stated is None:  # otherwise the folder contains a sweep that was checked
             self._check_names()
@@ -170,7 +174,9 @@ class Sweep(Answer, Value):
                 message = f"vary: {name} has {n} numbers, got a distribution of {size}; give arrays of {n}"
                 raise SweepError(f"{message}, for example normal(mean={[0] * n}, sd=0.1)")
         try:
-            batch_of(self.setup, None, None, values, ())
+            batch = batch_of(self.setup, None, None, values, ())
+            if self.uncut and (why := batch.why_one_by_one):
+                raise SweepError(f"uncut: {why}, so the runs are not in lock step; leave it out")
         except QueryError as error:
             raise SweepError(f"vary: {str(error).removeprefix('vary: ')}") from None
 

@@ -15,8 +15,9 @@ from robot_dyn import RobotDynError, Rollouts, Setup, Trajectory
 from robot_dyn.foundations import SweepError, because
 from robot_dyn.simulation import MOST_BYTES, parts_of_run
 from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
 from robot_dyn.simulation.rollouts.lock_step import LANES
-from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
+from robot_dyn.simulation.rollouts.rollouts import batch_of, run_batch, stepping_groups
 from robot_dyn.tools.sweeps.figures import Runs
 from robot_dyn.tools.sweeps.rows import FIXED, RAISED, Rows, empty, joined
 from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
@@ -24,6 +25,28 @@ from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
 _PART_BYTES = 2**23  # bytes recorded by the runs of a part: memory is independent of the chunk, and blocks are reused
 _RECORDS = ("q", "v", "u", "energy", "work")
 Look = Callable[[float], object]
+
+
+@final
+@dataclass(frozen=True)
+class OneByOne:
+    """Runs made one by one, not in lock step.
+
+    Attributes:
+        runs: Their number.
+        runs_s: Time of these runs, in [s].
+        all_s: Time of all runs, in [s].
+    """
+
+    runs: int
+    runs_s: float
+    all_s: float
+
+    def __add__(self, other: OneByOne) -> OneByOne:
+        return OneByOne(self.runs + other.runs, self.runs_s + other.runs_s, self.all_s + other.all_s)
+
+
+IN_LOCK_STEP = OneByOne(0, 0.0, 0.0)
 
 
 class Stopped(Exception):  # noqa: N818  not an error
@@ -59,9 +82,19 @@ class Work:
         """Return the rows of runs start, …, stop − 1."""
         return self.made(start, stop, None)[0]
 
+    def compared(self) -> Comparison:
+        """Make some runs, drawn at random, uncut and with steps that end at thresholds, and compare their figures."""
+        sweep, runs = self.sweep, drawn(self.sweep.runs, self.sweep.seed)
+        values = [sweep.values(run, run + 1) for run in runs.tolist()]
+        by_name = {name: np.concatenate([of[name] for of in values]) for name in values[0]}
+        uncut, cut = (Work(replace(sweep, uncut=how))._rows(runs, by_name) for how in (True, False))
+        others = int((uncut["outcome"] != cut["outcome"]).sum())
+        figures = {name: uncut[name] for name in sweep.figures}
+        return Comparison(len(runs), sweep.runs, others, tuple(differences(figures, cut, sweep.units)))
+
     def made(
         self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None
-    ) -> tuple[Rows, dict[str, np.ndarray]]:
+    ) -> tuple[Rows, dict[str, np.ndarray], OneByOne]:
         """Make runs.
 
         Args:
@@ -71,29 +104,46 @@ class Work:
             look: Function called about ten times a second; it ends the work by raising.
 
         Returns:
-            The rows of the runs, and their samples by name, (k, m, n), nan where not kept.
+            The rows of the runs, their samples by name, (k, m, n), nan where not kept, and the runs made one by one.
         """
         selection, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
-        samples, parts = dict[str, np.ndarray](), []
+        samples, parts, alone = dict[str, np.ndarray](), list[Rows](), IN_LOCK_STEP
         if selection is not None and t is not None:
             samples = {name: np.full((stop - start, len(t), n), np.nan) for name in selection.names}
+
+        def use(runs: np.ndarray, result: Rollouts) -> None:
+            nonlocal alone
+            ran = result.statistics
+            alone += OneByOne(ran.one_by_one, ran.one_by_one_s, ran.wall_s)
+            if selection is not None and t is not None:
+                selected = selection.of(runs, result.diverged)
+                _check_times(result.t, t)
+                for name, x in samples.items():
+                    x[runs[selected] - start, : len(result.t)] = getattr(result, name)[selected]
+
         for first in range(start, stop, self.part):
             last = min(first + self.part, stop)
-            values = self.sweep.values(first, last)
-            columns = np.column_stack(list(values.values())).T
-            rows = empty(last - first, dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures)
-            for runs, result in self._results(np.arange(first, last), values, look):
-                if isinstance(result, str):
-                    rows["why"][runs - first] = result
-                    continue
-                self._write(rows, runs - first, result)
-                if selection is not None and t is not None:
-                    selected = selection.of(runs, result.diverged)
-                    _check_times(result.t, t)
-                    for name, x in samples.items():
-                        x[runs[selected] - start, : len(result.t)] = getattr(result, name)[selected]
-            parts.append(rows)
-        return joined(parts), samples
+            parts.append(self._rows(np.arange(first, last), self.sweep.values(first, last), look, use))
+        return joined(parts), samples, alone
+
+    def _rows(
+        self,
+        runs: np.ndarray,
+        values: dict[str, np.ndarray],
+        look: Look | None = None,
+        use: Callable[[np.ndarray, Rollouts], object] = lambda runs, result: None,
+    ) -> Rows:
+        """Return the rows of runs with these numbers, in order, and call `use` with the rollouts of some of them."""
+        columns = np.column_stack(list(values.values())).T
+        rows = empty(len(runs), dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures)
+        for some, result in self._results(runs, values, look):
+            places = np.searchsorted(runs, some)
+            if isinstance(result, str):
+                rows["why"][places] = result
+            else:
+                self._write(rows, places, result)
+                use(some, result)
+        return rows
 
     def times(self) -> np.ndarray:
         """Return the times of samples, (m,), in [s], from the first of 64 runs that finishes."""
@@ -118,8 +168,8 @@ class Work:
         batch, reasons = self._batch(np.array([i]), self.sweep.values(i, i + 1), _RECORDS)
         if batch is None:
             raise SweepError(f"run {i} raised: {reasons[0]}")
-        ((_, passed),) = manners(batch)
-        return run_batch(batch, passed, True, 1, MOST_BYTES)[0]
+        ((_, passed),) = stepping_groups(batch)
+        return run_batch(batch, passed, self.sweep.uncut, 1, MOST_BYTES)[0]
 
     def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
         """Write the results of runs into rows, with figures for runs that finished."""
@@ -151,8 +201,8 @@ class Work:
 
         def made(places: np.ndarray) -> list[tuple[np.ndarray, Rollouts]]:
             some, results = batch.some(places), []
-            for at, passed in manners(some):
-                result = run_batch(some.some(at), passed, True, 1, MOST_BYTES, look)
+            for at, passed in stepping_groups(some):
+                result = run_batch(some.some(at), passed, self.sweep.uncut, 1, MOST_BYTES, look)
                 if result.stopped.any():  # Ctrl-C during the runs
                     raise Stopped
                 results.append((some.number_of(at), result))

@@ -20,7 +20,7 @@ from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.model.findings import estimated_links
 from robot_dyn.model.robot import Robot
 from robot_dyn.shapes import elements, mesh_files, meshes
-from robot_dyn.shapes.addresses import find_file, shown
+from robot_dyn.shapes.addresses import as_written, find_file, shown
 from robot_dyn.shapes.mesh_files import MeshError
 from robot_dyn.shapes.meshes import WHITE, Part, Rgba
 from robot_dyn.shapes.triangles import Mesh
@@ -100,7 +100,8 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
         if doubt and inertia:
             artist.notes.append(f"inertia box of link {link!r}: {doubt}, in red; correct its <inertia>")
     estimated = [f"{robot.name}: {text}" for text in estimated_links(robot.description)]
-    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), (*artist.remarks, *estimated), tuple(boxes))
+    remarks = (*artist.remarks, *artist.elsewhere, *estimated)
+    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), remarks, tuple(boxes))
 
 
 def solids(
@@ -109,26 +110,31 @@ def solids(
 ) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:  # fmt: skip
     """Return the shapes of each link, of the first kind with a readable shape; and notes on unreadable ones.
 
+    The notes state the addresses of meshes as written; a note on "file" reports meshes read from other files.
+
     Args:
         robot: The robot.
         package_dirs: See `drawing`.
         kinds: The elements, in this order.
         links: Names of links; all of them if not given.
     """
-    artist = _Artist(robot, package_dirs)
+    artist = _Artist(robot, package_dirs, as_written)
     found = artist.upright(lambda: artist.link_solids(kinds, links))
-    return found, tuple(dict.fromkeys(artist.notes))
+    return found, (*dict.fromkeys(artist.notes), *(f"file: {remark}" for remark in artist.elsewhere))
 
 
 class _Artist:
     """Draws one robot; stores its meshes, its named materials and its notes."""
 
-    def __init__(self, robot: Robot, package_dirs: Iterable[str | Path]) -> None:
+    def __init__(
+        self, robot: Robot, package_dirs: Iterable[str | Path], shown: Callable[[str | None], str] = shown
+    ) -> None:
+        self.shown = shown  # the text of an address in notes
         self.name, self.source = robot.name, Path(robot.description.source)
         self.element, _ = parse(robot.description.text, robot.description.source)
         self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
-        self.notes, self.remarks = list[str](), list[str]()
-        self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs), remarks=self.remarks)
+        self.notes, self.remarks, self.elsewhere = list[str](), list[str](), list[str]()
+        self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs), remarks=self.elsewhere)
         self._turned = frozenset({meshes.GLTF})  # formats whose files with y up are turned to z up
         self._y_up: list[tuple[str, str, ndarray, Mesh]] = []  # of these files: format, link, pose and mesh
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
@@ -238,14 +244,14 @@ class _Artist:
 
     def mesh(self, element: Any) -> tuple[Part, ...]:
         address = element.get("filename")
-        path, scale = self.file(address), elements.numbers(element, "scale", 3, "1 1 1")
+        scale = elements.numbers(element, "scale", 3, "1 1 1")
         try:
-            parts, complaints = self._read(path, scale, self._turned)
+            parts, complaints = self._read(self.file(address), scale, self._turned)
         except MeshError as error:
-            raise MeshError(f"mesh {shown(address)}: {error}") from None
+            raise MeshError(f"mesh {self.shown(address)}: {error}") from None
         if element.get("materials") == "ignored":  # of MJCF, whose geoms state the colour
             return tuple(replace(part, rgba=None, image=None) for part in parts)
-        self.notes += [f"mesh {shown(address)}: {complaint}; drawn without it" for complaint in complaints]
+        self.notes += [f"mesh {self.shown(address)}: {complaint}; drawn without it" for complaint in complaints]
         return parts
 
     def pose(self, name: str, element: Any) -> ndarray:
@@ -270,6 +276,6 @@ class _Artist:
                 r, g, b, a = (min(max(x, 0.0), 1.0) for x in elements.numbers(color, "rgba", 4))
                 return (r, g, b, a), None
         except MeshError as error:
-            what = f"texture {shown(address)}" if address else "material"
+            what = f"texture {self.shown(address)}" if address else "material"
             self.notes.append(f"link {name!r}: {what}: {error}; drawn without it")
         return None, None

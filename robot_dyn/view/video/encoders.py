@@ -35,7 +35,7 @@ def ffmpeg() -> Any:
 
 
 def encode(pictures: Iterable[bytes], file: Path, size: tuple[int, int], fps: int) -> None:
-    """Write pictures (PNG) of a size in pixels, of even numbers, as .mp4, or as .gif, which is repeated without end.
+    """Write PNG pictures as .mp4, or as .gif, which repeats for ever; width and height are even numbers of pixels.
 
     Raises:
         VideoError: If ffmpeg fails.
@@ -43,24 +43,24 @@ def encode(pictures: Iterable[bytes], file: Path, size: tuple[int, int], fps: in
     from PIL import Image
 
     if file.suffix == ".gif":
-        of_kind = {"codec": "gif", "pix_fmt_out": "pal8"}
+        codec = {"codec": "gif", "pix_fmt_out": "pal8"}
         options = ["-filter_complex", _PALETTE, "-loop", "0", "-final_delay", str(round(100 / fps))]
     else:
-        of_kind = {"codec": "libx264"}
+        codec = {"codec": "libx264"}
         options = ["-crf", str(_CRF), "-movflags", "+faststart"]
     writer = ffmpeg().write_frames(
         str(file), size, fps=fps, quality=None, macro_block_size=1, ffmpeg_log_level="fatal", output_params=options,
-        **of_kind,
+        **codec,
     )  # fmt: skip
     try:
         pictures = iter(pictures)
-        first = [*islice(pictures, 1)]  # before ffmpeg starts, which prints texts where no picture comes
+        first = [*islice(pictures, 1)]  # before ffmpeg starts, which prints messages if it gets no picture
         writer.send(None)
         for picture in chain(first, pictures):
             writer.send(Image.open(io.BytesIO(picture)).convert("RGB").tobytes())
     except OSError as cause:
-        raise VideoError(f"ffmpeg fails: {why(cause).splitlines()[0]}") from None
+        raise VideoError(f"ffmpeg failed: {why(cause).splitlines()[0]}") from None
     finally:
         writer.close()
     if not file.is_file() or not file.stat().st_size:
-        raise VideoError("ffmpeg has written nothing; is there room among the temporary files?")
+        raise VideoError("ffmpeg has written nothing; is the disk of the temporary files full?")

@@ -18,6 +18,7 @@ from robot_dyn.tools.doctor import Severity, check_urdf, checked
 from tests.broken_files import BROKEN, LINKS, SOUND
 from tests.cli.test_command_documents import PROMISE
 from tests.command import run
+from tests.drawings import stl
 from tests.long import long
 
 Q = np.array([0.3, -0.7, 1.1])
@@ -438,3 +439,18 @@ def test_an_arm_of_points_with_shapes_is_a_warning_and_a_single_one_is_a_note() 
     assert [x.severity for x in points] == [Severity.WARNING] * 3 and "all its moments are 0" in points[0].what
     (alone,) = [x for x in checked(chain([1.0], [0.1], 0.0).encode(), "cube.urdf").findings if x.kind == "inertia_zero"]
     assert alone.severity is Severity.NOTE
+
+
+@pytest.mark.parametrize("address", ["C:\\arms\\meshes\\hand.stl", "file:///home/user/meshes/hand.stl"])
+def test_meshes_of_another_computer_are_noted_with_the_path_or_the_folder_that_was_read(
+    address: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(SOUND.replace('<box size="0.05 0.07 0.12"/>', f'<mesh filename="{address}"/>'))
+    (absent,) = [x for x in check_urdf(file).findings if x.kind.startswith("shape")]
+    assert (absent.kind, absent.where) == ("shape_missing", "link 'hand'") and address in absent.what
+    (tmp_path / "meshes").mkdir()
+    stl(tmp_path / "meshes" / "hand.stl", 0.3)
+    (near,) = [x for x in check_urdf(file).findings if x.kind.startswith("shape")]
+    assert (near.kind, near.severity.value, near.where) == ("shape_elsewhere", "note", "file")
+    assert "'meshes'" in near.remedy

@@ -70,7 +70,7 @@ def write(run: TrajectoryData, columns: list[Column], stream: BinaryIO) -> None:
 
 
 def _causes(run: TrajectoryData) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Return the torque of the joints by cause, (m, n) each, or the reason why there is none."""
+    """Return the joint torque due to each cause, (m, n), or the reason why it is unavailable."""
     try:
         return causes_of(run).torques, {}
     except QueryError as error:
@@ -118,5 +118,5 @@ def _names(names: Sequence[str]) -> list[str]:
 
 
 def _units(columns: Iterable[Column]) -> dict[str, str]:
-    """Return the units by heading without unit; q, v and u are position, velocity and effort."""
+    """Return the unit of each column, by quantity and name; q, v and u are position, velocity and effort."""
     return {f"unit of {column.quantity} {column.of}".rstrip(): column.unit for column in columns if column.unit}

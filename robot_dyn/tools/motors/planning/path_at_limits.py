@@ -15,12 +15,12 @@ from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.geometric_path import geometric_path, in_time, turning_points
 from robot_dyn.tools.motors.planning.path_plan import (
     BINDS,
-    Judgement,
+    LimitUse,
     PathPlan,
     bindings,
+    checked_times,
     elsewhere,
-    judged,
-    judged_times,
+    limit_use,
     phases,
 )
 from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, why_not
@@ -87,8 +87,8 @@ def path(
     check_positions(plant, geometry)
     check_limited(plant, limits, geometry)
     names = plant.dynamics.joint_names
-    motion, judgement = _within(plant, limits, geometry)
-    largest, at_limits = float(judgement.most.max()), float((judgement.most >= BINDS).mean())
+    motion, use = _within(plant, limits, geometry)
+    largest, at_limits = float(use.largest.max()), float((use.largest >= BINDS).mean())
     moves = np.any(geometry.coefficients[:, 1:], axis=(0, 1))
     free = [name for i, name in enumerate(names) if moves[i] and np.isinf(limits.effort[i])]
     findings = [f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free]
@@ -103,22 +103,22 @@ def path(
         fraction,
         largest,
         at_limits,
-        elsewhere(judgement, motion.breaks),
-        tuple(bindings(judgement, limits, names)),
-        tuple(phases(judgement, names)),
-        {name: judgement.shares[0][:, i] for i, name in enumerate(names) if np.isfinite(limits.effort[i])},
+        elsewhere(use, motion.breaks),
+        tuple(bindings(use, limits, names)),
+        tuple(phases(use, names)),
+        {name: use.shares[0][:, i] for i, name in enumerate(names) if np.isfinite(limits.effort[i])},
     )
 
 
-def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, Judgement]:
-    """Return the fastest motion within limits, and its judgement."""
+def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, LimitUse]:
+    """Return the fastest motion within limits, and its use of the limits."""
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
         motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
-        judgement = judged(plant, limits, motion, judged_times(motion.end_s))
-        largest = float(judgement.most.max())
+        use = limit_use(plant, limits, motion, checked_times(motion.end_s))
+        largest = float(use.largest.max())
         if largest <= _REFUSED and error <= _ERROR:
-            return motion, judgement
+            return motion, use
         allowed /= max(1.0, largest)
     raise PlanError(
         f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the error of the torque"
@@ -172,7 +172,7 @@ def _solved(
 def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tuple[np.ndarray, bool]:
     """Return the pieces to halve, (k,), and True if enough of the motion is at a limit and none of it above."""
     h = np.diff(motion.breaks)
-    most = judged(plant, limits, motion, (motion.breaks[:-1, None] + h[:, None] * _INSIDE).ravel()).most
+    most = limit_use(plant, limits, motion, (motion.breaks[:-1, None] + h[:, None] * _INSIDE).ravel()).largest
     most = most.reshape(len(h), -1)
     at_limits = (h[:, None] * (most >= BINDS)).mean(axis=-1).sum() / h.sum()
     above = most.max(axis=-1) > _ABOVE

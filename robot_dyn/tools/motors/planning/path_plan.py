@@ -1,4 +1,4 @@
-"""Analysis of a motion at its limits by the inverse dynamics of its plant: binding limits, and times without one."""
+"""Analysis of a motion along a path by inverse dynamics: the limits that bind, and why none does at other times."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from robot_dyn.control import PiecewisePolynomial, Plan
 from robot_dyn.foundations import UNREPORTED, Answer, Block, Table, Value, legend, plot, read_only
 from robot_dyn.tools.motors.limits import Limits
 
-JUDGED = 10_000  # number of times at which a motion is checked, in the middle of equal parts
-BINDS = 0.99  # share of a limit from which it binds
-_BRIEF = 2e-3  # relative to the duration: shorter phases are not listed
+CHECKED = 10_000  # number of times at which a motion is checked, in the middle of equal parts
+BINDS = 0.99  # a limit binds if at least this share of it is used
+_BRIEF = 2e-3  # fraction of the duration; shorter phases are not listed
 KINDS = "torque", "velocity", "acceleration"
 
 
@@ -50,10 +50,10 @@ class PathPlan(Answer, Value):
 
     Attributes:
         plan: The motion, from rest to rest, with limits (torques times `fraction`) and findings.
-        fraction: Fraction of the effort limits that it may use.
+        fraction: Fraction of the effort limits that the motion may use.
         largest: Largest torque, velocity or acceleration as a share of its limit; for torques, of `fraction` times it.
         at_limits: Share of the time in which at least one limit is reached to 1 %.
-        elsewhere: Reasons for no binding limit in the rest of the time, with the share of each reason.
+        elsewhere: Reasons why no limit binds in the rest of the time, with the share of time of each.
         bindings: Use of each finite limit.
         phases: Phases in the order of time, except phases shorter than 0.2 % of the duration.
         ratios: Torque as a share of its limit in 10 000 equal parts of the time, (10 000,), by joint.
@@ -96,52 +96,52 @@ class PathPlan(Answer, Value):
 
     @property
     def drawing(self) -> str:
-        return plot("torque, as a share of its limit,", judged_times(self.duration_s), self.ratios) + legend(
+        return plot("torque, as a share of its limit,", checked_times(self.duration_s), self.ratios) + legend(
             self.ratios
         )
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class LimitUse:
     """Signed shares of the limits of torque, velocity and acceleration, (m, n), at times t, (m,)."""
 
     t: np.ndarray
     shares: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     @property
-    def most(self) -> np.ndarray:
+    def largest(self) -> np.ndarray:
         """The largest absolute share at each time, (m,)."""
         return np.abs(np.concatenate(self.shares, axis=-1)).max(axis=-1)
 
 
-def judged(plant: Plant, limits: Limits, motion: PiecewisePolynomial, t: np.ndarray) -> Judgement:
+def limit_use(plant: Plant, limits: Limits, motion: PiecewisePolynomial, t: np.ndarray) -> LimitUse:
     """Compute the shares of a plant's limits that a motion uses, by inverse dynamics."""
     q, v, a = motion.at(t)
     tau = plant.inverse_dynamics(q, v, a, t=0.0)
-    return Judgement(t, (tau / limits.effort, v / limits.velocity, a / limits.acceleration))
+    return LimitUse(t, (tau / limits.effort, v / limits.velocity, a / limits.acceleration))
 
 
-def judged_times(duration: float) -> np.ndarray:
+def checked_times(duration: float) -> np.ndarray:
     """Return the times at which a motion is checked, (10 000,), in [s]."""
-    return (np.arange(JUDGED) + 0.5) * duration / JUDGED
+    return (np.arange(CHECKED) + 0.5) * duration / CHECKED
 
 
-def bindings(judgement: Judgement, limits: Limits, joint_names: tuple[str, ...]) -> Iterator[Binding]:
+def bindings(use: LimitUse, limits: Limits, joint_names: tuple[str, ...]) -> Iterator[Binding]:
     """Yield each finite limit with the share that the motion uses."""
     values = limits.effort, limits.velocity, limits.acceleration
-    for kind, share, limit in zip(KINDS, judgement.shares, values, strict=True):
+    for kind, share, limit in zip(KINDS, use.shares, values, strict=True):
         for i, name in enumerate(joint_names):
             if np.isfinite(limit[i]):
                 used = np.abs(share[:, i])
                 yield Binding(name, kind, float(limit[i]), float(used.max()), float((used >= BINDS).mean()))
 
 
-def phases(judgement: Judgement, joint_names: tuple[str, ...]) -> Iterator[Phase]:
-    """Yield the intervals in which a limit binds to 1 %, the nearest limit if there are several."""
-    n, all_of = len(joint_names), np.abs(np.concatenate(judgement.shares, axis=-1))
-    binding = np.where(judgement.most >= BINDS, np.argmax(all_of, axis=-1), -1).tolist()
-    part, k = float(judgement.t[0] * 2), 0
+def phases(use: LimitUse, joint_names: tuple[str, ...]) -> Iterator[Phase]:
+    """Yield the intervals in which a limit binds to 1 %; if several bind, the one with the largest share."""
+    n, all_shares = len(joint_names), np.abs(np.concatenate(use.shares, axis=-1))
+    binding = np.where(use.largest >= BINDS, np.argmax(all_shares, axis=-1), -1).tolist()
+    part, k = float(use.t[0] * 2), 0
     for limit, group in groupby(binding):
         start, k = k, k + len(list(group))
         if k - start > _BRIEF * len(binding):
@@ -149,10 +149,10 @@ def phases(judgement: Judgement, joint_names: tuple[str, ...]) -> Iterator[Phase
             yield Phase(start * part, k * part, joint, kind)
 
 
-def elsewhere(judgement: Judgement, breaks: np.ndarray) -> dict[str, float]:
+def elsewhere(use: LimitUse, breaks: np.ndarray) -> dict[str, float]:
     """Return reasons why no limit binds, with the share of time; the last reason is unknown."""
-    free = judgement.most < BINDS
-    cell = np.searchsorted(breaks, judgement.t, side="right") - 1
+    free = use.largest < BINDS
+    cell = np.searchsorted(breaks, use.t, side="right") - 1
     bound = np.zeros(len(breaks) + 1, dtype=bool)  # cells in which a limit binds, with one more at either end
     bound[cell[~free] + 1] = True
     at_ends = (cell == 0) | (cell == len(breaks) - 2)

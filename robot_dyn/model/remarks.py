@@ -1,0 +1,52 @@
+"""Remarks on a robot and its states that a user may not expect: no torque of gravity, order of q, angles in degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import tau as TURN  # noqa: N812  a full turn, in [rad]
+
+import numpy as np
+
+
+def no_torque(gravity: tuple[float, float, float]) -> str:
+    """Return the remark on a robot on which gravity exerts no torque."""
+    if not any(gravity):
+        return "gravity is zero, so N(q) = 0"
+    return f"gravity {gravity} m/s² exerts no torque on any joint at any position, so N(q) = 0"
+
+
+def gravity_lines(gravity: tuple[float, float, float], free: tuple[str, ...], n: int) -> Iterator[str]:
+    """Yield a remark if gravity exerts no torque on some joints of n at any position."""
+    if len(free) == n:
+        yield f"{no_torque(gravity)} without effects"
+    elif free:
+        yield f"gravity exerts no torque on {', '.join(free)} at any position, as the robot is mounted"
+
+
+def order_lines(joints: tuple[str, ...], file_order: tuple[str, ...]) -> Iterator[str]:
+    """Yield the order of q if it is not that of the file."""
+    if joints != file_order:
+        yield f"order of q: {', '.join(joints)}; the file has {', '.join(file_order)}: give a state by joint name"
+
+
+def degree_lines(
+    joints: Sequence[str], types: Sequence[str], q: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> Iterator[str]:
+    """Yield a remark if angles beyond the limits, and beyond a turn, are within the limits as degrees.
+
+    Args:
+        joints: Names of the n joints.
+        types: Their types.
+        q: Positions, (n,), in [rad] or [m].
+        lower: Lower limits, (n,).
+        upper: Upper limits, (n,).
+    """
+    turns = np.array([kind == "revolute" for kind in types])
+    degrees = np.deg2rad(q)
+    beyond = turns & ((q < lower) | (q > upper)) & (np.abs(q) > TURN)
+    if beyond.any() and ((degrees >= lower) & (degrees <= upper))[turns].all():
+        i = int(beyond.argmax())
+        yield (
+            f"q looks like degrees: {q[i]:g} rad of {joints[i]} is beyond its limits, {lower[i]:.4g} to {upper[i]:.4g},"
+            f" but {q[i]:g}° is not; angles are in rad, such as np.deg2rad(q)"
+        )
