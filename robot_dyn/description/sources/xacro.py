@@ -37,7 +37,7 @@ class Expansion(NamedTuple):
     """An expanded xacro file.
 
     Attributes:
-        text: The URDF, each element on a line of its own, as the command `xacro` writes it.
+        text: The URDF, with a line for each element, as the command `xacro` writes it.
         warnings: Warnings of xacro.
         places: For each element of the text, in its order, the line from which it comes and the macro calls that led
             there, innermost first: "line 3 of arm.xacro, macro arm called in line 9". The checked file is not named.

@@ -7,10 +7,12 @@ from collections.abc import Iterator, Set
 from copy import copy
 from typing import Any, final
 
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
 from robot_dyn.description import declared_first, other_format, parse
 from robot_dyn.foundations import DescriptionError
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
-from robot_dyn.tools.doctor.tags import decoded, edited, tags
+from robot_dyn.tools.doctor.tags import Place, decoded, edited, tags
 
 _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
 
@@ -39,7 +41,7 @@ class Document:
         self.text, self.source = text, source
         self.root, self.assumed = parse(text, source, comments=True)
         self._written, self._encoding = decoded(declared_first(text)[0], self.root.getroottree().docinfo.encoding)
-        self._rewritten: Set[Any] = frozenset()
+        self._rewritten: Set[Place] = frozenset()
         self._stated = {
             element: (tag, element.tag, dict(element.attrib))
             for element, tag in zip(self.root.iter("*"), tags(self._written), strict=True)
@@ -58,7 +60,7 @@ class Document:
         matches = (element for element in self.root.iterfind(kind) if (element.get("name") or "").strip() == name)
         return next(matches, None)
 
-    def mended(self, rewritten: Set[Any]) -> Document:
+    def mended(self, rewritten: Set[Place]) -> Document:
         """Return the document with the text of its current elements; all else in the text is as in the file.
 
         Args:
@@ -70,7 +72,7 @@ class Document:
         new.text = text.encode(self._encoding, "surrogateescape")
         return new
 
-    def written(self, element: Any, key: str) -> str:
+    def written(self, element: etree._Element, key: str) -> str:
         """Return the value of an attribute as the file writes it, with its line breaks and references."""
         return self._written[slice(*self._stated[element][0].attributes[key][1])]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Set
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
@@ -22,6 +22,7 @@ _ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _STARTS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}  # byte order marks
 
 Span = tuple[int, int]
+Place = tuple[etree._Element, str]  # an attribute of an element
 
 
 @final
@@ -40,6 +41,9 @@ class Tag:
     attributes: Mapping[str, tuple[Span, Span]]
     start: Span
     stop: int
+
+
+Stated = tuple[Tag, str, Mapping[str, str]]  # an element as read: its tag, name and attributes
 
 
 def decoded(text: bytes, declared: str | None) -> tuple[str, str]:
@@ -65,8 +69,8 @@ def tags(text: str) -> list[Tag]:
             result[at] = Tag((*tag.names, match.span(2)), tag.attributes, tag.start, match.end())
             continue
         attributes = {
-            each[1]: (each.span(1), each.span(2) if each[2] is not None else each.span(3))
-            for each in _ATTRIBUTE.finditer(text, *match.span(3))
+            stated[1]: (stated.span(1), stated.span(2) if stated[2] is not None else stated.span(3))
+            for stated in _ATTRIBUTE.finditer(text, *match.span(3))
         }
         if not match[4]:
             open_.append(len(result))
@@ -75,7 +79,7 @@ def tags(text: str) -> list[Tag]:
 
 
 def edited(
-    text: str, stated: Mapping[Any, tuple[Tag, str, Mapping[str, str]]], root: Any, rewritten: Set[Any], encoding: str
+    text: str, stated: Mapping[etree._Element, Stated], root: etree._Element, rewritten: Set[Place], encoding: str
 ) -> str:
     """Return a text with the changes of its elements since they were read.
 
@@ -83,7 +87,7 @@ def edited(
         text: The text.
         stated: Elements of the text, with their tags, and their names and attributes as read.
         root: Root of the changed elements. Elements that are not in `stated` are inserted; missing ones are removed.
-        rewritten: Pairs of element and attribute whose value is written even if it is the same but for its blanks.
+        rewritten: Pairs of element and attribute whose value is written even if only its blanks differ.
         encoding: Encoding of the text; characters that it lacks are written as references.
     """
     edits: list[tuple[Span, str]] = []
@@ -133,8 +137,8 @@ def _value(raw: str, before: str, after: str, quote: str) -> str:
     return re.sub(r"\S+", lambda _: next(new), raw)
 
 
-def _inserted(text: str, tag: Tag, elements: list[Any]) -> tuple[Span, str]:
-    """Return the edit that inserts elements after a start tag, each on a line of its own if the text has lines."""
+def _inserted(text: str, tag: Tag, elements: list[etree._Element]) -> tuple[Span, str]:
+    """Return the edit that inserts elements after a start tag, on new lines if the text has a line break there."""
     blank = re.compile(r"\s*").match(text, tag.start[1])
     before = blank[0] if blank and "\n" in blank[0] else ""
     new = ""
@@ -144,7 +148,8 @@ def _inserted(text: str, tag: Tag, elements: list[Any]) -> tuple[Span, str]:
         for part in element.iter():
             part.tail = part.text = None
         new += before + etree.tostring(element, encoding="unicode")
-    if len(tag.names) > 1:
+    (start, end), *closing = tag.names
+    if closing:
         return (tag.start[1], tag.start[1]), new
-    slash, name = text.rindex("/", *tag.start), text[slice(*tag.names[0])]
+    slash, name = text.rindex("/", *tag.start), text[start:end]
     return (slash, tag.start[1]), f">{new}</{name}>"
