@@ -38,7 +38,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 # Made by the library: their constructors take what it computed.
 RESULTS = {
     "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "Stress", "SweepResult",
+    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "Stress", "SweepResult",
     "Trajectory", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
@@ -76,7 +76,7 @@ LAX |= {name: {key for key, each in declared(kind).items() if each.infinite} for
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.stress, rd.tools.sweeps)
+TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.step, rd.tools.stress, rd.tools.sweeps)
 ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
@@ -234,7 +234,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.stress.stress, robot=robot, samples=100, runs=0, seed=3, budget_s=1e-3, on_progress=lambda
             spent, what: None),
         call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
-            density=1000.0, allow_overlap=False, units=True, xacro=None),
+            density=1000.0, allow_overlap=False, units=True,
+            inertia_unit="kg mm2", xacro=None),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
         call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), least=0.5, above=0.5,

@@ -30,7 +30,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import MissingTimeError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import PLANT, Dynamics
-from robot_dyn.queries.quantity import Key, Quantity, title
+from robot_dyn.queries.quantity import Key, title
 
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
 
@@ -80,7 +80,7 @@ class CompiledPlant:
 
         return Engine(
             self._traced,
-            dict[Key, Quantity](PLANT),
+            {**PLANT},
             SelfCheck(self.dynamics.robot, "the interpreted plant"),
             truth,
             self.dynamics.dtype,

@@ -25,19 +25,20 @@ class Hold:
         joint: Name of the joint.
         by: Names of the effects that can hold the joint.
         load: Torque or force that these effects balance, in [N m] or [N].
-        least, most: Loads below and above which the joint breaks away; −inf or inf towards a stop.
+        lower_breakaway, upper_breakaway: Loads below and above which the joint breaks away, in [N m] or [N]; −inf or
+            inf towards a stop.
     """
 
     joint: str
     by: tuple[str, ...]
     load: float
-    least: float
-    most: float
+    lower_breakaway: float
+    upper_breakaway: float
 
     @reported
     def margin(self) -> float:
         """Return the smallest change of load, in either direction, at which the joint breaks away; at least 0."""
-        return max(min(self.load - self.least, self.most - self.load), 0.0)
+        return max(min(self.load - self.lower_breakaway, self.upper_breakaway - self.load), 0.0)
 
 
 def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> tuple[Hold, ...]:

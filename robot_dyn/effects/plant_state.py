@@ -90,10 +90,12 @@ class PlantState(Answer, Value):
             yield ""
             yield f"held at rest [{force}]:"
             headings = ("joint", "from", "load", "slides below", "slides above", "margin")
-            loads = (without_rounding((x.load, x.least, x.most, x.margin)) for x in self.held)
-            yield Table(
-                headings, tuple((x.joint, ", ".join(x.by), *load) for x, load in zip(self.held, loads, strict=True))
+            loads = (
+                without_rounding((hold.load, hold.lower_breakaway, hold.upper_breakaway, hold.margin))
+                for hold in self.held
             )
+            rows = tuple((hold.joint, ", ".join(hold.by), *load) for hold, load in zip(self.held, loads, strict=True))
+            yield Table(headings, rows)
 
 
 def plant_state(

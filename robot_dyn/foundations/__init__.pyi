@@ -86,6 +86,7 @@ from robot_dyn.foundations.validate import duration as duration
 from robot_dyn.foundations.validate import function as function
 from robot_dyn.foundations.validate import instance as instance
 from robot_dyn.foundations.validate import integer as integer
+from robot_dyn.foundations.validate import joint_values as joint_values
 from robot_dyn.foundations.validate import number as number
 from robot_dyn.foundations.validate import numbers as numbers
 from robot_dyn.foundations.validate import one_state as one_state

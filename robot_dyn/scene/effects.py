@@ -197,7 +197,7 @@ class Wrench(Acting):
 class MassScale(Edit):
     """Factors on mass and inertia of single links: the same shape with another density; payloads excepted."""
 
-    kind: Literal["mass_scale"]
+    kind: Literal["mass_scales"]
     factors: dict[str, Positive]
     """Factor by link. To change the mass alone, vary `LINK.mass`."""
 

@@ -23,6 +23,8 @@ from robot_dyn.simulation.results.run_data import SAMPLED as SAMPLED
 from robot_dyn.simulation.results.run_file import RunFileError as RunFileError
 from robot_dyn.simulation.results.samples import tracking_of as tracking_of
 from robot_dyn.simulation.rollouts.parameters import parts_of_run as parts_of_run
+from robot_dyn.simulation.rollouts.periods import Periods as Periods
+from robot_dyn.simulation.rollouts.rollouts import batch_of as batch_of
 from robot_dyn.simulation.run.outcome import Ending as Ending
 from robot_dyn.simulation.run.outcome import Outcome as Outcome
 from robot_dyn.simulation.run.outcome import Reason as Reason

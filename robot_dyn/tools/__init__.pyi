@@ -2,6 +2,7 @@
 from robot_dyn.tools import doctor as doctor
 from robot_dyn.tools import motors as motors
 from robot_dyn.tools import proof as proof
+from robot_dyn.tools import step as step
 from robot_dyn.tools import stress as stress
 from robot_dyn.tools import sweeps as sweeps
 

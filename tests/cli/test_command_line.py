@@ -258,4 +258,6 @@ def test_commands_without_a_known_group_come_last(monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_help_of_check_names_what_needs_fix() -> None:
-    assert re.search(r"--allow-overlap and --units need --fix", re.sub(r"[\s│]+", " ", said("check-urdf", "--help")))
+    assert re.search(
+        r"--allow-overlap, --units and --inertia-unit need --fix", re.sub(r"[\s│]+", " ", said("check-urdf", "--help"))
+    )

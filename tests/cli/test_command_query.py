@@ -190,8 +190,8 @@ def test_a_scene_is_asked_at_its_start_for_what_is_held_and_how_firmly(tmp_path:
     assert (one["joint"], one["by"]) == ("joint_1", ["dry_friction", "rigid_stops"])
     assert (two["joint"], two["by"]) == ("joint_2", ["dry_friction"])
     assert (one["load"], two["load"]) == pytest.approx(u - N, rel=1e-13)
-    assert (one["least"], one["most"]) == (None, 4.0)
-    assert (two["least"], two["most"]) == (-20.0, 20.0)
+    assert (one["lower_breakaway"], one["upper_breakaway"]) == (None, 4.0)
+    assert (two["lower_breakaway"], two["upper_breakaway"]) == (-20.0, 20.0)
     assert one["margin"] == pytest.approx(4.0 - one["load"])
     assert two["margin"] == pytest.approx(20.0 - abs(two["load"]))
     why = answer["why"]

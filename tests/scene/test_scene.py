@@ -96,7 +96,7 @@ WRITTEN = {  # kinds whose keys are not the coefficients of a class, and the pla
     "gravity": ("", lambda: rd.Plant(rd.load("planar_2r"))),
     "lock": ("joints = {joint_1 = 0.2}", lambda: rd.Plant(ARM.with_(lock={"joint_1": 0.2}))),
     "payload": ('frame = "tip"\nmass_kg = 0.5', lambda: rd.Plant(ARM.with_(payload=rd.Payload("tip", 0.5)))),
-    "mass_scale": ("factors = {bar_2 = 1.7}", lambda: rd.Plant(ARM.with_(mass_scales={"bar_2": 1.7}))),
+    "mass_scales": ("factors = {bar_2 = 1.7}", lambda: rd.Plant(ARM.with_(mass_scales={"bar_2": 1.7}))),
     "armature": (
         "inertia_kg_m2 = {joint_1 = 0.002, joint_2 = 0.001}\ngear_ratio = {joint_1 = 9.0}",
         lambda: rd.Plant(ARM.with_(armature=[0.002 * 81.0, 0.001])),

@@ -60,7 +60,7 @@ class Tiles:
     def __init__(self, batch: Batch, code: MachineCode, thresholds: Thresholds | None = None) -> None:
         setup, equation, n = batch.setup, code.compiled_form, code.compiled_form.plant.dynamics.n
         self.batch, self.setup, self.code, self.thresholds = batch, setup, code, thresholds
-        self.y = _starts(equation, batch.q0, batch.v0)
+        self.y = starts(equation, batch.q0, batch.v0)
         self.levels = batch.levels(equation.plant, equation.controller)
         places = {
             "q": range(n),
@@ -241,7 +241,7 @@ def _compiled(setup: Setup) -> Setup:
     return replace(setup, plant=plant, controller=controller)
 
 
-def _starts(equation: StateEquation, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def starts(equation: StateEquation, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return the states at the starts of runs, (B, m)."""
     if equation.canonical or equation.equation_of_motion.drives:
         return np.stack([equation.start(*start) for start in zip(q, v, strict=True)])

@@ -7,6 +7,7 @@ document, finding                 the file; findings and changes
 spelling, literals, names         findings in the text
 limits, axes, proportions         findings in joints and lengths
 masses, gravity_load              findings in the numbers of the robot
+neighbours                        masses and moments against joint distances, other links and a data sheet
 shapes, estimate                  comparison with the shapes of links; missing inertials
 command                           the command `check-urdf`
 """

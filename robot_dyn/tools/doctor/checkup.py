@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 from robot_dyn import Robot
-from robot_dyn.description import catalog, description, parse, searched
+from robot_dyn.description import Structure, catalog, description, parse, searched, structure_of
 from robot_dyn.foundations import UNREPORTED, Answer, Block, DescriptionError, QueryError, reported, truth
 from robot_dyn.shapes import Masses
 from robot_dyn.tools.doctor import (
@@ -19,6 +19,7 @@ from robot_dyn.tools.doctor import (
     literals,
     masses,
     names,
+    neighbours,
     proportions,
     report,
     shapes,
@@ -92,25 +93,29 @@ class Checkup(Answer):
 def check_urdf(
     name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), mass: Mapping[str, float] | None = None,
     total_mass: float | None = None, density: float | None = None, allow_overlap: bool = False, units: bool = False,
-    xacro: Mapping[str, str | float | bool] | None = None,
+    inertia_unit: str | None = None, xacro: Mapping[str, str | float | bool] | None = None,
 ) -> Checkup:  # fmt: skip
     """Check a URDF file: its numbers, names, limits and units, and its inertias against the shapes of its links.
 
     Args:
         name_or_path: Name of a robot, or path or package:// address of a file, as in `load`.
         package_dirs: Folders in which packages of meshes are searched first.
-        mass: Masses by link, in [kg]: repairs add inertials to links with a shape but no inertial, as in `load`.
-        total_mass: Mass of the robot, in [kg], for the same repairs; mass not stated elsewhere is shared by volume.
+        mass: Masses by link, in [kg], for example from a data sheet. A mass that the file states is compared with it.
+            Repairs add inertials to links with a shape but no inertial, as in `load`.
+        total_mass: Mass of the robot, in [kg]; mass not stated elsewhere is shared by volume. If the file states all
+            masses, their sum is compared with it.
         density: Density in [kg/m³] for the same repairs, instead of total_mass.
         allow_overlap: With masses: accept meshes whose closed parts overlap, as in `load`.
         units: Convert masses, inertias and shapes from suspected wrong units. Invented numbers can look like these.
+        inertia_unit: Unit from which repairs convert the moments of all links, for example "kg mm2", if the doctor
+            suspects it.
         xacro: Expand the file by xacro first, as `load` does; findings name its lines and macro calls.
 
     Raises:
         CatalogError: If there is no such file, or an entry of `package_dirs` is not a folder.
         DescriptionError: If the file cannot be opened or expanded (a refused file is a finding); or if masses are given
             and the shape of a link without inertial cannot be read.
-        QueryError: If a mass, the total or the density is not allowed, as in `load`.
+        QueryError: If a mass, the total or the density is not allowed, as in `load`, or the unit is unknown.
     """
     package_dirs = searched(package_dirs)
     path, units = catalog.find(name_or_path, package_dirs), truth("units", units)
@@ -118,31 +123,34 @@ def check_urdf(
     if nothing and truth("allow_overlap", allow_overlap):
         raise QueryError("allow_overlap applies to estimates; give mass, total_mass or density, or remove it")
     estimates = None if nothing else Masses({} if mass is None else mass, total_mass, density, allow_overlap)
+    unit = None if inertia_unit is None else neighbours.checked_unit(inertia_unit)
     if xacro is not None:
         from robot_dyn.description import expand
 
         expansion = expand(path, xacro, package_dirs)
-        return _of_xacro(checked(expansion.text, str(path), package_dirs, estimates, units), expansion)
+        return _of_xacro(checked(expansion.text, str(path), package_dirs, estimates, units, unit), expansion)
     try:
         description.refuse_xacro(path)
     except DescriptionError as error:
         return _refused(str(path), error)
-    return checked(description.content(path), str(path), package_dirs, estimates, units)
+    return checked(description.content(path), str(path), package_dirs, estimates, units, unit)
 
 
 def checked(
-    text: bytes, source: str, package_dirs: tuple[Path, ...] = (), estimates: Masses | None = None, units: bool = False
-) -> Checkup:
+    text: bytes, source: str, package_dirs: tuple[Path, ...] = (), estimates: Masses | None = None,
+    units: bool = False, inertia_unit: str | None = None,
+) -> Checkup:  # fmt: skip
     """Check the text of a file, and repair it until a check finds nothing more to repair.
 
     One repair may reveal the next: limits in degrees, once converted to radians, may turn out to be crossed.
     """
-    first = step = _examined(text, source, package_dirs, estimates, units)
+    first = step = _examined(text, source, package_dirs, estimates, units, inertia_unit)
     texts = [text]
     while step.repaired is not None and step.repaired not in texts:
         texts.append(step.repaired)
         estimates = None if step.estimated else estimates
-        step = _examined(step.repaired, source, package_dirs, estimates, units)
+        inertia_unit = None if step.examined else inertia_unit  # converted once
+        step = _examined(step.repaired, source, package_dirs, estimates, units, inertia_unit)
     repaired = texts[-1] if len(texts) > 1 else None
     gone = _gone(first.findings, step.findings)
     return Checkup(source, first.loads, first.findings, repaired, step.findings, gone, first.examined)
@@ -159,8 +167,9 @@ class _Examined(NamedTuple):
 
 
 def _examined(
-    text: bytes, source: str, package_dirs: tuple[Path, ...], estimates: Masses | None, units: bool
-) -> _Examined:
+    text: bytes, source: str, package_dirs: tuple[Path, ...], estimates: Masses | None, units: bool,
+    inertia_unit: str | None,
+) -> _Examined:  # fmt: skip
     """Check a text once, and apply one round of repairs."""
     refusal = _refusal(text, source)
     try:
@@ -179,9 +188,12 @@ def _examined(
     robot = None if still is not None else _loaded(document, findings)
     estimated = robot is not None and not repairs
     if robot is not None:
+        stated = structure_of(robot.description, robot.edits)
+        findings += neighbours.common_unit(document, stated, inertia_unit)
         findings += [_assumed(text) for text in robot.description.findings if not _reported(text, findings)]
         shape_of, unread = shapes.shapes(robot, package_dirs)
         findings += [_of_mesh(note) for note in unread]
+        sheet, estimates = _compared(estimates, stated, set(shape_of))
         # shapes may change in the next round of repairs, so masses are estimated in the last one
         missing = [
             *missing_inertials(document, robot.description, shape_of, estimates if estimated else None, package_dirs)
@@ -195,13 +207,34 @@ def _examined(
         findings += [*shapes.directions(document, robot, shape_of, package_dirs, findings)]
         findings = shapes.with_repairs(document, robot, shape_of, package_dirs, findings)
         findings += masses.beyond_reach(document, robot, findings)
+        findings += neighbours.wide_links(document, stated, shape_of)
+        volumes = {name: shape.unit.mass for name, shape in shape_of.items() if shape.unit is not None}
+        findings += neighbours.odd_masses(document, stated, volumes)
+        findings += () if sheet is None else neighbours.of_data_sheet(document, stated, sheet)
         findings += gravity_load.weak_joints(document, robot, findings)
-        if conversions := [finding for finding in findings if finding.changes and finding.supposed and units]:
+        conversions = [x for x in findings if x.changes and ((x.supposed and units) or x.kind == "inertia_unit")]
+        if conversions:
             document = _rewritten(document, conversions)
     loads = refusal is None and not any(finding.kind == "refused" for finding in findings)
     findings = [x if x.line else replace(x, line=written.line(x.where, x.what)) for x in findings]
     repaired = None if document is written or document.text == text else document.text
     return _Examined(loads, _gravest_first(findings), repaired, robot is not None, estimated)
+
+
+def _compared(
+    masses: Masses | None, stated: Structure, shaped: set[str]
+) -> tuple[neighbours.Sheet | None, Masses | None]:
+    """Split masses into those to compare with the file's and those for links that lack them; None without any."""
+    if masses is None:
+        return None, None
+    known = {name: mass for name, mass in masses.by_link.items() if name in stated.links and stated.links[name].mass}
+    lacking = {name: mass for name, mass in masses.by_link.items() if name not in known}
+    complete = not lacking and all(stated.links[name].mass for name in shaped)
+    sheet = neighbours.Sheet(known, masses.total if complete else None)
+    total = None if complete else masses.total
+    if not lacking and total is None and masses.density is None:
+        return sheet, None
+    return sheet, replace(masses, by_link=lacking, total=total)
 
 
 def _gone(before: Iterable[Finding], after: Iterable[Finding]) -> tuple[Finding, ...]:

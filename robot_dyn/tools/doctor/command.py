@@ -32,6 +32,7 @@ def check_urdf(
     /,
     fix: bool = False,
     units: bool = False,
+    inertia_unit: str | None = None,
     all_: bool = False,
     force: Force = False,
     options: FileOptions = FILE_AS_STATED,
@@ -39,26 +40,30 @@ def check_urdf(
 ) -> None:
     """Check URDF files, and repair them with --fix.
 
-    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors remain. Masses, densities,
-    --allow-overlap and --units need --fix.
+    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors remain. --mass and --total-mass
+    are compared with the file; with --fix they complete links without inertia. --density, --allow-overlap, --units and
+    --inertia-unit need --fix.
 
     Options:
         files (FILE...): URDF files, or names of robots.
         fix: Write NAME.fixed.urdf here; only the repaired values differ from the file.
         units: With --fix: convert values from suspected wrong units, such as kg mm².
+        inertia_unit (UNIT): With --fix: convert the moments of all links from this unit, such as kg·mm2, if suspected.
         all_: Print each finding, not one line for each kind.
     """
     from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity
 
-    for option in [*options.stated, *(["--units"] if units else [])]:
-        if option not in ("--package-dir", "--xacro") and not fix:
+    changing = {"--units": units, "--inertia-unit": inertia_unit is not None}
+    for option in [*options.stated, *(name for name, is_set in changing.items() if is_set)]:
+        if option not in ("--package-dir", "--xacro", "--mass", "--total-mass") and not fix:
             raise QueryError(f"{option} needs --fix, which writes the changes; add it, or remove {option}")
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
         raise QueryError("--fix: two of the files would get the same name; repair them one by one")
     checkups = [
-        rd.tools.doctor.check_urdf(file, units=units, **options.reading) for file in progress(files, "checking")
+        rd.tools.doctor.check_urdf(file, units=units, inertia_unit=inertia_unit, **options.reading)
+        for file in progress(files, "checking")
     ]
     written = {}
     for file, checkup in zip(files, checkups, strict=True):

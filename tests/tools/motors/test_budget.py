@@ -406,14 +406,14 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
     given = budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
     fast = fastest(given)
     assert (
-        fast.given
+        fast.is_original
         and fast.budget is given
         and fast.duration_s == fast.before_s
         and fast.plan.reference is PLAN.reference
     )
     assert "the original motion, which fits" in repr(fast)
     half = fastest(given, fraction=0.4)
-    assert not half.given and "at 40 % of the peak torques" in repr(half)
+    assert not half.is_original and "at 40 % of the peak torques" in repr(half)
 
 
 def test_a_budget_needs_no_extra_and_loads_no_drawing() -> None:

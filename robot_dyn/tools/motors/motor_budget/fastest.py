@@ -36,16 +36,16 @@ _SHORT = 1e-6  # relative to the longest stroke: a shorter one is rounding, or a
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class FastestMotion(Answer):
-    """The fastest motion found along the path of a given motion.
+    """The fastest motion along the path of another motion, the original.
 
     Attributes:
         before_s: Duration of the original motion, in [s].
         strokes: Number of movements from stop to stop.
-        distance: Largest distance from the path, in [rad] or [m].
+        distance: Largest distance from the original path, in [rad] or [m].
         slowed: Factor λ on the duration that meets the continuous torque limits; 1 if not needed, or if no λ suffices.
         no_pace: Message about the joint that exceeds its continuous torque limit at every pace; empty if a pace fits.
-        given: True if the original motion fits, and no faster one that fits was found.
-        fraction: Fraction of the peak torques that it may use.
+        is_original: True if this is the original motion: it fits, and no faster one that fits was found.
+        fraction: Fraction of the peak torques that the motion may use.
         budget: Motor budget of the motion.
         plan: The motion.
     """
@@ -55,7 +55,7 @@ class FastestMotion(Answer):
     distance: float
     slowed: float
     no_pace: str
-    given: bool
+    is_original: bool
     fraction: float
     budget: MotorBudget
     plan: Plan = field(metadata=UNREPORTED)
@@ -68,7 +68,7 @@ class FastestMotion(Answer):
     def blocks(self) -> Iterator[Block]:
         _, *rest = self.plan.blocks()
         limit = "" if self.fraction == 1 else f" at {100 * self.fraction:.6g} % of the peak torques"
-        if self.given:
+        if self.is_original:
             yield f"found no faster motion along the path that fits{limit}; the original motion, which fits:"
         else:
             stops = "without a stop" if self.strokes == 1 else f"in {self.strokes} strokes, with the same pauses"
@@ -110,10 +110,12 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
     result = {"before_s": before, "strokes": strokes, "fraction": fraction}
     if _fits(motor_budget, fraction) and (not new_budget.fits or plan.duration_s >= before):
         plan = replace(plan, reference=motion, method="the original motion", findings=motor_budget.findings)
-        return FastestMotion(**result, distance=0.0, slowed=1.0, no_pace="", given=True, budget=motor_budget, plan=plan)
+        return FastestMotion(
+            **result, distance=0.0, slowed=1.0, no_pace="", is_original=True, budget=motor_budget, plan=plan
+        )
     slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, new_budget))
     return FastestMotion(
-        **result, distance=distance, slowed=slowed, no_pace=no_pace, given=False, budget=new_budget, plan=plan
+        **result, distance=distance, slowed=slowed, no_pace=no_pace, is_original=False, budget=new_budget, plan=plan
     )
 
 

@@ -1,0 +1,130 @@
+"""Runs in lock step that advance by one period at a time: tiles of 64, whose states and inputs change in between.
+
+The period is the duration of a setup. Each call runs the same segments from time 0, so nothing may depend on the time.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from math import inf
+from typing import cast, final
+
+import numpy as np
+
+from robot_dyn.codegen.threads import shared
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.values import aligned
+from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.simulation.compiled.cache import machine_code
+from robot_dyn.simulation.compiled.choice import checked
+from robot_dyn.simulation.dynamics.loop_state import LaneEnd, lanes_of, loop_config, start_position
+from robot_dyn.simulation.observation.observation import NOTHING
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES, starts
+from robot_dyn.simulation.run.recording import Loop, records_of
+from robot_dyn.simulation.run.watch import LARGEST
+from robot_dyn.simulation.setup.segment_table import segment_table
+
+
+@final
+class Periods:
+    """The tiles of a batch, their states, and one parameter that changes from period to period.
+
+    Args:
+        batch: The runs, with a setup of one period; their starts are not used.
+        inputs: Name of the parameter that changes; the batch has it as a sweep.
+        threads: Largest number of threads.
+
+    Attributes:
+        uses_time: True if the machine code depends on the time.
+    """
+
+    def __init__(self, batch: Batch, inputs: str, threads: int) -> None:
+        setup = batch.setup
+        build = partial(
+            machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras, swept=tuple(batch.sweep)
+        )
+        code = checked(setup, build)
+        self._equation, self._count = code.compiled_form, len(batch)
+        equation, n = self._equation, code.compiled_form.plant.dynamics.n
+        programs = code.code.programs.values()
+        self.uses_time = any(
+            0 in (*program.outputs, *(x for op in program.ops for x in op.operands)) for program in programs
+        )
+        tiles = -(-len(batch) // LANES)
+        self._numbers = np.minimum(np.arange(tiles * LANES), len(batch) - 1)  # a tile that is not full repeats a run
+        numbers = self._numbers.reshape(tiles, LANES)
+        parameters = [code.run_parameters({name: x[row] for name, x in batch.sweep.items()}) for row in numbers]
+        self._y, self._parameters = aligned((tiles, equation.size, LANES)), np.array(parameters)
+        self._y[...] = np.nan
+        self._alive, self._reason = np.zeros((tiles, LANES), np.int64), np.ones((tiles, LANES), np.int64)
+        swept = [x.name for x in code.inputs if x.name in batch.sweep]
+        sizes = [batch.sweep[name].shape[1] for name in swept]
+        first = n * equation.sampled + sum(sizes[: swept.index(inputs)])
+        self._inputs = self._parameters[:, first : first + batch.sweep[inputs].shape[1]]
+        table = segment_table(setup)
+        table.ticks[-1] = 0  # the next period begins with this tick
+        assert code.machine_loop is not None
+        self._workers = []
+        for some in np.array_split(np.arange(tiles), min(threads, tiles)):  # each thread has its own work arrays
+            stepper = cast(PlainMethod, setup.method).stepper(FLOAT64, equation.size, n, equation.size | 1, LANES)
+            lanes = lanes_of(equation, self._y[0], parameters[0], 0, table.parameters[0], numbers[0])
+            empty = np.empty((0, 0, LANES))
+            records = records_of(
+                rows=np.zeros(0, np.int64), y=empty, sampled=empty, shared=np.empty((0, equation.size)),
+                step_log=np.empty((0, equation.size)), columns=np.empty((1 + 3 * n, 0)), observation=NOTHING,
+            )  # fmt: skip
+            config = loop_config(equation, alone=False)._replace(largest=LARGEST)
+            position, calls = start_position(inf), []
+            for tile in some:
+                runs = lanes._replace(
+                    y=self._y[tile], run_parameters=self._parameters[tile],
+                    alive=self._alive[tile], reason=self._reason[tile],
+                )  # fmt: skip
+                arguments = code.code.addresses, stepper.coefficients, stepper.work
+                loop = Loop(table, runs, records, config, position)
+                calls.append(partial(code.machine_loop.calls(), *arguments, loop, np.zeros(1, np.int64)))
+            self._workers.append((position, calls))
+
+    @property
+    def work(self) -> int:
+        """Number of entries of y that precede the works."""
+        return self._equation.size - len(self._equation.sources)
+
+    def start(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the states of runs that start at q and v (k, n), (k, m)."""
+        return starts(self._equation, q, v)
+
+    @property
+    def ended(self) -> np.ndarray:
+        """True for runs that have diverged, whose state is nan, (B,)."""
+        return self._reason.ravel()[: self._count] > 0
+
+    @property
+    def y(self) -> np.ndarray:
+        """States of all runs, (B, m): q, v, states of the controller and of effects, works in the latest period."""
+        return self._y.transpose(0, 2, 1).reshape(-1, self._equation.size)[: self._count]
+
+    def write(self, runs: np.ndarray, y: np.ndarray, ended: np.ndarray) -> None:
+        """Write states of some runs, (B,), from states y of all runs (B, m); `ended` is True for diverged runs."""
+        lanes = np.flatnonzero(runs[self._numbers])
+        tile, column, run = lanes // LANES, lanes % LANES, self._numbers[lanes]
+        self._y[tile, :, column] = np.where(ended[run, None], np.nan, y[run])
+        self._alive[tile, column] = ~ended[run]
+        self._reason[tile, column] = np.where(ended[run], LaneEnd.OVERFLOW, LaneEnd.RUNNING)
+
+    def advance(self, inputs: np.ndarray) -> None:
+        """Advance all runs by a period with these values of the parameter, (B, size)."""
+        rows = inputs if len(inputs) == len(self._numbers) else inputs[self._numbers]
+        self._inputs[...] = rows.reshape(len(self._y), LANES, -1).transpose(0, 2, 1)
+        self._y[:, self.work :] = 0.0
+        shared(self._run, len(self._workers), 1, len(self._workers))
+
+    def _run(self, first: int, last: int) -> int:
+        for position, calls in self._workers[first:last]:
+            for call in calls:
+                for counter in position[:-1]:
+                    counter[0] = 0
+                position.budget[0] = np.iinfo(np.int64).max
+                call()
+        return 0
