@@ -75,7 +75,8 @@ class Advice(Answer):
         at_period: Stability of the loop at its period. This period may be stable although a shorter one is not.
         period_growth: Spectral radius: the asymptotic growth factor of deviations per period; 1 without sampled
             control.
-        grows_anyway: Growth rate of deviations under the same control in continuous time, in [1/s]; 0 if they decay.
+        continuous_growth_rate: Growth rate of deviations under the same control in continuous time, in [1/s]; 0 if
+            they decay.
         growth: Factor by which deviations grow over the run because steps or periods are too long.
         run: The run of the setup with its error estimate; None if deviations would grow a thousandfold, or the run
             has too many steps.
@@ -90,7 +91,7 @@ class Advice(Answer):
     longest_period_s: float
     at_period: Stability = Stability.STABLE
     period_growth: float = 1.0
-    grows_anyway: float = 0.0
+    continuous_growth_rate: float = 0.0
     growth: float = 1.0
     run: Trajectory | None = field(default=None, metadata=UNREPORTED)
 
@@ -147,7 +148,7 @@ class Advice(Answer):
         limit, unstable = self.longest_period_s, self.at_period is Stability.UNSTABLE
         marginal = self.at_period is Stability.MARGINAL
         if unstable and not limit:
-            verdict = f"; no period is stable: use {remedy(self.grows_anyway)}"
+            verdict = f"; no period is stable: use {remedy(self.continuous_growth_rate)}"
         elif unstable:
             verdict = f"; the loop is stable up to {limit:.3g} s: use period_s={below(limit)}, or lower gains"
         elif self.period_s > limit:
@@ -241,7 +242,7 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
         longest_period_s=min((loop.longest_period(period) for loop in loops), default=inf),
         at_period=worst(loop.growth(period) for loop in loops).verdict if loops else Stability.STABLE,
         period_growth=max((loop.factor(period) for loop in loops), default=1.0),
-        grows_anyway=max((loop.grows_anyway() for loop in loops), default=0.0),
+        continuous_growth_rate=max((loop.continuous_growth_rate() for loop in loops), default=0.0),
         growth=max(1.0, *factors, 1.0),
     )
 

@@ -27,7 +27,7 @@ app = typer.Typer(
 
 GROUPS = "Inspection", "Dynamics", "Simulation", "Verification", "Files"
 """Groups of commands, in the order of --help."""
-LOOK, ASK, RUN, TRUST, FILES = GROUPS
+INSPECTION, DYNAMICS, SIMULATION, VERIFICATION, FILES = GROUPS
 _TOPICS = "demo", "query", "show", "diff_runs", "simulate", "cost", "export", "cache"
 
 
@@ -41,10 +41,13 @@ def command(group: str, name: str | None = None) -> Callable[[Callable[..., Any]
 
 
 def program() -> Any:
-    """Return the program: all commands by group, those of tools after those of the core, unknown groups last."""
+    """Return the program with all commands sorted by group.
+
+    In a group, commands of plug-ins follow those of the package; unknown groups come last.
+    """
     for topic in _TOPICS:
         import_module(f"robot_dyn.cli.commands.{topic}")
-    for entry in entry_points(group="robot_dyn.commands"):  # of tools
+    for entry in entry_points(group="robot_dyn.commands"):  # of plug-ins
         entry.load()
     order = {group: k for k, group in enumerate(GROUPS)}
     app.registered_commands.sort(key=lambda subcommand: order.get(str(subcommand.rich_help_panel), len(order)))
@@ -56,13 +59,13 @@ def program() -> Any:
             subcommand.context_class(subcommand, parent=context, **subcommand.context_settings)
         )
     for option in options:
-        if getattr(option, "is_flag", False):  # takes no value: --help has no type for it
+        if getattr(option, "is_flag", False):  # a flag takes no value, so --help shows no type
             option.metavar = ""  # pyright: ignore[reportAttributeAccessIssue]
     return whole
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         import robot_dyn
 
         put(f"robot-dyn {robot_dyn.__version__}\n")
@@ -79,7 +82,7 @@ def _options(
 
 
 def progress(items: Iterable[str], description: str) -> Iterator[str]:
-    """Yield the items, with a progress bar on stderr if it is a terminal, that names the item being worked on."""
+    """Yield the items; if stderr is a terminal, show a progress bar there with the name of the current item."""
     items = list(items)
     with bar(len(items), description) as advance:
         for done, item in enumerate(items):
@@ -88,15 +91,17 @@ def progress(items: Iterable[str], description: str) -> Iterator[str]:
 
 
 @contextmanager
-def bar(total: float | None = None, what: str = "simulating", at_the_end: str = "") -> Iterator[Callable[..., object]]:
-    """A progress bar with the time left on stderr if it is a terminal; nothing elsewhere.
+def bar(
+    total: float | None = None, description: str = "simulating", at_the_end: str = ""
+) -> Iterator[Callable[..., object]]:
+    """Show a progress bar with the remaining time if stderr is a terminal; otherwise show nothing.
 
-    It yields a function that takes the finished part of the total and the name of the current work.
+    Yield a function of the amount done so far and, optionally, a description of the current work.
 
     Args:
-        total: All that is to be done; None if that is not known: the bar then has the time spent.
-        what: Name of the work, unless that function receives another.
-        at_the_end: Name of the work that remains once the total is reached.
+        total: Total amount of work; None if unknown: the bar then shows the elapsed time.
+        description: Description of the work, unless the function receives another.
+        at_the_end: Description of the work that remains after the total is reached.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
@@ -111,13 +116,13 @@ def bar(total: float | None = None, what: str = "simulating", at_the_end: str = 
             return Text(f"{int(task.elapsed or 0)} s" if left is None else f"{format_duration(left)} left")
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), Time(Column(no_wrap=True)))
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as shown:
-        task = shown.add_task(what, total=total)
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as display:
+        task = display.add_task(description, total=total)
 
-        def advance(done: float, now: str = what) -> None:
+        def advance(done: float, current: str = description) -> None:
             ended = total is not None and done >= total
-            if done < shown.tasks[0].completed:  # it is done again, as pilot runs are
-                shown.reset(task)
-            shown.update(task, completed=done, description=at_the_end if ended and at_the_end else now)
+            if done < display.tasks[0].completed:  # the work starts again, for example after pilot runs
+                display.reset(task)
+            display.update(task, completed=done, description=at_the_end if ended and at_the_end else current)
 
         yield advance

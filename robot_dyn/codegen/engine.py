@@ -273,7 +273,7 @@ class Engine:
         ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # doubtful states are not written
         answered = np.broadcast_to(np.equal(run(rows, ours), Status.FINE), STATES)
         theirs, effects = self.truth(quantity, state)
-        self.self_check.judge(requested, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
+        self.self_check.check(requested, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
 
 
 def _never(*_: Any) -> int:

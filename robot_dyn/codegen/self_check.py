@@ -28,10 +28,10 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import Quantity
 
 STATES = 16
-_LEAST = {
+_TOLERANCE = {
     "float64": 1e-12,
     "float32": 2e-5,
-}  # the library's tolerance; for float32 scaled by the ratio of rounding units
+}  # tolerance by dtype: for float64 that of `compare`, for float32 about 335 rounding units
 
 
 class SelfCheckError(RobotDynError):
@@ -58,18 +58,18 @@ class SelfCheck:
         """
         rng, n = np.random.default_rng(20), self.dynamics.n
         q = rng.uniform(-np.pi, np.pi, (STATES, n))
-        v, a, other = rng.normal(size=(3, STATES, n))
-        tau = self.dynamics.inverse_dynamics(q, v, other)
+        v, a, accelerations = rng.normal(size=(3, STATES, n))
+        tau = self.dynamics.inverse_dynamics(q, v, accelerations)
         return {"t": rng.uniform(0, 1, STATES), "q": q, "v": v, "a": a, "tau": tau, "u": tau}
 
-    def judge(
+    def check(
         self,
         quantity: Quantity,
         ours: np.ndarray,
         theirs: np.ndarray,
         dtype: str,
         effects: np.ndarray | float = 0.0,
-        answered: np.ndarray | None = None,
+        has_result: np.ndarray | None = None,
     ) -> None:
         """Compare results at `states()` with independent results.
 
@@ -78,19 +78,19 @@ class SelfCheck:
             ours: Results of the kernel, (STATES, …).
             theirs: Independent results.
             dtype: The dtype of the kernel.
-            effects: Torques of effects, which are terms of the sum.
-            answered: True at states where the kernel returns a result instead of reporting doubt, (STATES,).
+            effects: Torques of the effects, which count as terms of τ.
+            has_result: True at states where the kernel returns a result instead of reporting doubt, (STATES,).
 
         Raises:
-            SelfCheckError: If they differ by more than rounding, or there are no results.
+            SelfCheckError: If they differ by more than the tolerance, or the kernel returns no result at any state.
         """
-        if answered is not None and not answered.any():
+        if has_result is not None and not has_result.any():
             raise SelfCheckError(f"compiled {quantity.name} has no result at any of {STATES} random states")
         scale = self._scale(quantity, theirs, effects)
         error = scaled(np.asarray(ours, dtype=float) - theirs, np.broadcast_to(scale, theirs.shape))
         error = np.where(np.isnan(error), np.inf, error)
-        if answered is not None:
-            error[~answered] = 0.0
+        if has_result is not None:
+            error[~has_result] = 0.0
         worst, tolerance = np.unravel_index(np.argmax(error), error.shape), self._tolerance(quantity, dtype)
         if not error[worst] <= tolerance:
             state = {name: x[worst[0]].tolist() for name, x in self.states().items()}
@@ -118,7 +118,7 @@ class SelfCheck:
         return own + d * np.max(np.abs(effects) / d) if np.ndim(effects) else own
 
     def _tolerance(self, quantity: Quantity, dtype: str) -> float:
-        return solved_tolerance(_LEAST[dtype], self._M, dtype) if quantity.solves else _LEAST[dtype]
+        return solved_tolerance(_TOLERANCE[dtype], self._M, dtype) if quantity.solves else _TOLERANCE[dtype]
 
     @cached_property
     def _M(self) -> np.ndarray:

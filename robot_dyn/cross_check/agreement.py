@@ -25,7 +25,7 @@ class Agreement:
         error: Difference relative to its scale.
         tolerance: Allowed error.
         entry: Joints or frame of the entry.
-        pinocchio, own: The two values; for numbers of the file, that of both implementations, and yourdfpy's.
+        pinocchio, own: The two values. For numbers of the file: the value used by both implementations, and yourdfpy's.
         state: q, v, a, tau, by name; empty for numbers of the file.
     """
 
@@ -142,7 +142,7 @@ class Pair:
 
 
 def worst_by_quantity(agreements: Iterable[Agreement]) -> tuple[Agreement, ...]:
-    """Return for each quantity the agreement with the largest fraction of its tolerance."""
+    """Return for each quantity the agreement with the largest error relative to its tolerance."""
     worst: dict[str, Agreement] = {}
     for agreement in agreements:
         current = worst.get(agreement.quantity)

@@ -3,7 +3,7 @@
     picked up at rest            (M + ΔM) v⁺ = M v⁻
     picked up at the hand's speed, or dropped     v⁺ = v⁻
 
-A body at rest that is grasped is an inelastic impact, which keeps the momentum of each joint and loses kinetic energy.
+Grasping a body at rest is an inelastic impact: it conserves the momentum of each joint and loses kinetic energy.
 [Moreau 1988; Featherstone, Rigid Body Dynamics Algorithms, 2008, §11.7]
 """
 
@@ -68,7 +68,7 @@ class CarriedPayload(Timed):
 
 
 def robot_with(dynamics: Dynamics, effects: Sequence[CarriedPayload], carried: Sequence[bool]) -> Robot:
-    """Return the robot with all these payloads, massless where they are not carried.
+    """Return the robot with all these payloads; those that are not carried have no mass.
 
     Raises:
         EffectError: If the dynamics are not a robot, or the link is unknown.

@@ -61,7 +61,7 @@ class Effect(Value):
     term: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        check_coefficients(self, EffectError, resolved=True)
+        check_coefficients(self, EffectError, allow_unresolved=True)
 
     def on(self, dynamics: Dynamics) -> Effect:
         """Return this effect with coefficients given by joint name or as "urdf" replaced by arrays (n,).

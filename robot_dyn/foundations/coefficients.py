@@ -2,8 +2,8 @@
 
     damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
-The declaration determines the checks of a coefficient, values by joint name or "urdf", its key in scenes and its name
-in sweeps, and makes it an input of machine code.
+The declaration determines how values are checked, whether values by joint name or "urdf" are accepted, and the name in
+scenes and sweeps. It also makes the coefficient an input of machine code.
 """
 
 from __future__ import annotations
@@ -115,24 +115,24 @@ class Coefficient:
         return self.shapes == JOINTS
 
     def checked(
-        self, name: str, values: object, *, error: type[RobotDynError], resolved: bool
+        self, name: str, values: object, *, error: type[RobotDynError], allow_unresolved: bool
     ) -> float | np.ndarray | Mapping[str, float] | str:
         """Return the checked numbers, as a frozen copy or as a float.
 
-        If `resolved`, values by joint name and "urdf" are returned unchanged; `on` resolves them for an arm.
+        If `allow_unresolved`, values by joint name and "urdf" are returned unchanged; `on` resolves them for an arm.
 
         Raises:
-            RobotDynError: If the numbers have the wrong shape or sign, or are not finite; of the class `error`.
+            RobotDynError: If the numbers have the wrong shape or sign, or are not finite; its class is `error`.
         """
-        if resolved and self.of_joints and isinstance(values, Mapping):
+        if allow_unresolved and self.of_joints and isinstance(values, Mapping):
             if not values:
                 raise error(f"{name} names no joint; give values by joint, or one number for all joints")
             return values
-        if resolved and self.stated and isinstance(values, str) and values == URDF:
+        if allow_unresolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
-        if resolved and self.stated in ("lower", "upper") and isinstance(values, str) and values == URDF_SOFT:
+        if allow_unresolved and self.stated in ("lower", "upper") and isinstance(values, str) and values == URDF_SOFT:
             return URDF_SOFT
-        if resolved and self.stated and isinstance(values, str):
+        if allow_unresolved and self.stated and isinstance(values, str):
             raise error(f'{name} must be real numbers or "{URDF}", got {shorten(values)!r}')
         array = numbers(
             name, values, *self.shapes, error=error, least=self.least, above=self.above, infinite=self.infinite
@@ -199,7 +199,7 @@ def declared(kind: type) -> Mapping[str, Coefficient]:
 
 @cache
 def defaults(kind: type) -> Mapping[str, object]:
-    """Return the defaults of coefficients of a class, by name, if they have one."""
+    """Return the default values of a class's coefficients by name; those without a default are left out."""
     names = declared(kind)
     return {x.name: x.default for x in _fields(kind) if x.name in names and x.default is not MISSING}
 
@@ -208,17 +208,17 @@ def _fields(kind: type) -> tuple[Field[Any], ...]:
     return fields(kind) if is_dataclass(kind) else ()
 
 
-def check_coefficients(part: object, error: type[RobotDynError], *, resolved: bool = False) -> None:
+def check_coefficients(part: object, error: type[RobotDynError], *, allow_unresolved: bool = False) -> None:
     """Check and freeze the coefficients of a part under construction; see `Coefficient.checked`."""
     for name, declared_as in declared(type(part)).items():
         value = getattr(part, name)
         if value is None and defaults(type(part)).get(name, 0) is None:
             continue  # optional
-        object.__setattr__(part, name, declared_as.checked(name, value, error=error, resolved=resolved))
+        object.__setattr__(part, name, declared_as.checked(name, value, error=error, allow_unresolved=allow_unresolved))
 
 
 def with_values(part: Owner, values: Mapping[str, object]) -> Owner:
-    """Return a copy of a part with other coefficients, unchecked: symbols, for example, would fail the checks.
+    """Return a copy of a part with other coefficients. They are not checked, so they may be symbols.
 
     A name may be a path into a nested part, such as "controller.kp" or "position.0.resolution".
     """
@@ -253,10 +253,10 @@ def _is_cached(kind: type, name: str) -> bool:
 
 
 def rebuilt(part: Owner, values: Mapping[str, object]) -> Owner:
-    """Return a copy of a part with other coefficients, constructed again and thus checked."""
+    """Return a copy of a part with other coefficients; its constructor checks them."""
     inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
-    dataclass: Any = part
-    return replace(dataclass, **{name: value for name, value in values.items() if "." not in name}, **inside)
+    instance_: Any = part
+    return replace(instance_, **{name: value for name, value in values.items() if "." not in name}, **inside)
 
 
 def value_at(part: object, path: str) -> ArrayLike | None:

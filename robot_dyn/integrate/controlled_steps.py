@@ -111,7 +111,7 @@ class Steps:
             self.message = f"finished at t = {self.t}"
 
     def _step(self, t: float, x: States) -> Between | None:
-        """Advance x.y by a step from t, and return its polynomial; None if every step is too small."""
+        """Advance x.y by a step from t and return its polynomial; None if the step would be too short."""
         stepper, control, end = self._stepper, self._control, self._end
         coefficients, work = stepper.coefficients, stepper.work
         if control.next_h[0] == 0:
@@ -147,10 +147,10 @@ class Steps:
         from scipy.optimize import brentq
 
         stop, root = cast(Any, self._stop), cast(Any, brentq)
-        # interpolation reaches the states at the ends up to rounding: the sign must not depend on that
+        # the polynomial matches the states at the ends only up to rounding, on which the sign must not depend
         ends = {t0: stop(t0, self.y), t1: -stop(t0, self.y)}
         t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
-        return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
+        return t if t != t0 else float(np.nextafter(t0, t1))  # times must increase
 
 
 @final

@@ -22,7 +22,7 @@ _BETA_ORDER = 0.2  # β times the order of the error: the weight of the previous
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # safety factor, and limits of the factor of a new step
 _NOT_FINITE = 0.1  # factor of a step whose error is not finite
 _STRETCH = 1.01  # a step is stretched to the end, to avoid a tiny last step
-_SPACINGS = 4  # of floats at t: the shortest step
+_SPACINGS = 4  # shortest step, in spacings of floats at t
 _ONE, _NO_MESH = np.ones(1), np.zeros(0)
 
 
@@ -77,7 +77,7 @@ class ControlledStepper(NamedTuple):
         error: (c, work, h, x, rtol, atol) → ‖e‖.
         dense: (f, c, work, t, h, x) → evaluations. It writes the polynomial of `between` into work.F, (d, m, 1).
         coefficients: Coefficients c of the method.
-        work: Work arrays; work.error, (…, k, 1), has the first k entries of y, whose error is controlled.
+        work: Work arrays; work.error, (…, k, 1), covers the first k entries of y, whose error is controlled.
         error_order: Order of ‖e‖ in h.
         begin: (f, c, work, t, x) → evaluations. It computes terms that depend only on (t, y), and writes the rate into
             work.K[0], (r, 1).
@@ -140,7 +140,7 @@ def first_step(f: Any, work: Any, control: StepControl, t: float, end: float, x:
 
 
 def next_of_mesh(control: StepControl, t: float, end: float) -> float:
-    """Return the first time of the mesh after t, or the end."""
+    """Return the first time of the mesh after t, or `end` if that is earlier."""
     mesh = control.mesh
     k: int = control.mesh_index[0]
     while k < len(mesh) and mesh[k] <= t:
@@ -187,7 +187,8 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
     """Return the function that chooses and takes a step, for the `step` and `error` of a method.
 
     choose(f, c, work, control, t, end, x) → evaluations, and True if a step succeeds. It returns False if the tolerance
-    requires a step as short as the rounding of t. Steps end at the times of the mesh, or earlier if the error requires.
+    requires a step shorter than a few spacings of floats at t, or if a step set by the mesh alone fails. Steps end at
+    the times of the mesh, or earlier if the error requires.
     """
 
     def choose(

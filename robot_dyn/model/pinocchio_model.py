@@ -1,4 +1,4 @@
-"""Building a `pinocchio.Model` from a description and its edits."""
+"""Construction of a `pinocchio.Model` from a description and its edits."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Built:
 
     Attributes:
         model: The `pinocchio.Model` of all moving joints.
-        couplings: Map from q to the positions of its joints.
+        couplings: Map from q to the positions of all moving joints.
         joint_names: Names of the n independent joints, in the order of q.
         description: Checked file, without the edits.
     """
@@ -50,7 +50,7 @@ class Built:
 
     @cached_property
     def sizes(self) -> Mapping[str, int]:
-        """Numbers for the letters in the shapes of quantities."""
+        """Values of the letters n and p in the shapes of quantities."""
         return MappingProxyType({"n": len(self.joint_names), "p": len(NAMES) * self.model.nv})
 
     @property
@@ -63,11 +63,11 @@ def build(description: Description, edits: Edits) -> Built:
     """Build the Pinocchio model of a description with its edits.
 
     Raises:
-        DescriptionError: If Pinocchio rejects it, or no joint moves.
-        EditError: If a payload's frame is unknown, or all joints are locked.
+        DescriptionError: If Pinocchio rejects it, or no joint or more than `MAX_MOVING` joints move.
+        EditError: If the link of an edit is unknown, or all joints are locked.
     """
     robot = description.element
-    state_edits(robot, edits)
+    write_edits(robot, edits)
     mimics = stated_mimics(robot)
     for joint in robot.iterfind("joint"):
         joint.set("name", _MARK + joint.get("name"))
@@ -76,7 +76,7 @@ def build(description: Description, edits: Edits) -> Built:
     try:
         model = pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"))
     except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
-        raise DescriptionError(f"{description.source}: Pinocchio refuses it: {error}") from None
+        raise DescriptionError(f"{description.source}: Pinocchio rejects it: {error}") from None
     if model.nv == 0:
         raise DescriptionError(
             f"{description.source}: no joint moves, so the robot has no dynamics;"
@@ -93,7 +93,7 @@ def build(description: Description, edits: Edits) -> Built:
     return Built(model, *_couplings(tuple(model.names[1:]), mimics), description)
 
 
-def state_edits(robot: etree._Element, edits: Edits) -> None:
+def write_edits(robot: etree._Element, edits: Edits) -> None:
     """Replace masses and inertias of links in the file by those of the edits, and scale both by link."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     with_mass = [name for name, inertial in links.items() if inertial is not None]
@@ -139,7 +139,7 @@ def _apply(edits: Edits, model: pin.Model) -> None:
         model.armature[model.idx_vs[ids[name]]] = value
     if edits.mass_scale != 1.0:
         for i, body in enumerate(model.inertias):
-            scaled = pin.Inertia(body)  # its other constructors refuse non-physical moments
+            scaled = pin.Inertia(body)  # its other constructors reject non-physical moments
             scaled.mass, scaled.inertia = edits.mass_scale * body.mass, edits.mass_scale * body.inertia
             model.inertias[i] = scaled
     links = link_frames(model)

@@ -26,7 +26,7 @@ from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import DescriptionError, ModelWarning
 from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.foundations.spatial import rotation, rotation_rpy, rpy_of
-from robot_dyn.model.pinocchio_model import scale_inertial, state_edits
+from robot_dyn.model.pinocchio_model import scale_inertial, write_edits
 
 _URDF = FileKind("a URDF", ".urdf", b"<?xml")
 _DRAWN = ("visual", "collision")
@@ -48,7 +48,7 @@ def write_urdf(description: Description, edits: Edits, path: str | Path) -> Path
 def _urdf_text(description: Description, edits: Edits, lacking: list[str], folder: Path) -> bytes:
     """Return the bytes of the file, with mesh addresses relative to `folder`."""
     out = description.element
-    state_edits(out, edits)
+    write_edits(out, edits)
     for inertial in out.iterfind("link/inertial") if edits.mass_scale != 1.0 else ():
         scale_inertial(inertial, edits.mass_scale)
     _fix_locked(out, dict(edits.lock))

@@ -2,7 +2,7 @@
 from robot_dyn.shapes import surface as surface
 from robot_dyn.shapes.estimate import Estimate as Estimate
 from robot_dyn.shapes.estimate import estimates as estimates
-from robot_dyn.shapes.estimate import shapes_of_lacking as shapes_of_lacking
+from robot_dyn.shapes.estimate import shapes_of_incomplete_links as shapes_of_incomplete_links
 from robot_dyn.shapes.masses import Masses as Masses
 from robot_dyn.shapes.mesh_files import MeshError as MeshError
 from robot_dyn.shapes.triangles import Mesh as Mesh

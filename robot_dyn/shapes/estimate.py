@@ -1,8 +1,9 @@
 """Inertials missing from a file, estimated from the shapes of links and from masses.
 
 A link without mass and moments gets both, and a centre of mass; a link with a mass but no moments gets only the
-moments. The body is the solid of the link's shape, or a shell of its convex hull below 200 kg/m³. Values stated by the
-file are not changed. Estimates are marked with <inertial estimated="…">, which later reads report.
+moments. The body is the solid of the link's shape, or the shell of its surfaces if the convex hull would have less than
+200 kg/m³. Values stated by the file are not changed. Estimates are marked with <inertial estimated="…">, which later
+reads report.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def with_estimates(description: Description, masses: Masses, package_dirs: Itera
     """Return the description with estimates for all links that have a shape but lack mass or moments.
 
     Args:
-        description: The file; its meshes are opened.
+        description: The file; its meshes are read.
         masses: Masses that the file does not state.
         package_dirs: Folders in which packages of meshes are searched first.
 
@@ -80,12 +81,12 @@ def with_estimates(description: Description, masses: Masses, package_dirs: Itera
         DescriptionError: If the shape of such a link cannot be read and the link moves. A link of the base, which does
             not affect the dynamics, is left out with a finding.
     """
-    shapes, unread = shapes_of_lacking(description, package_dirs, masses.allow_overlap)
+    shapes, unread = shapes_of_incomplete_links(description, package_dirs, masses.allow_overlap)
     new, left_out = estimates(description, shapes, masses, unread)
     return replace(marked(description, new), findings=tuple(dict.fromkeys((*description.findings, *left_out))))
 
 
-def shapes_of_lacking(
+def shapes_of_incomplete_links(
     description: Description, package_dirs: Iterable[str | Path] = (), allow_overlap: bool = False
 ) -> tuple[dict[str, LinkShape], dict[str, str]]:
     """Return the shapes of links without mass or moments, and read errors for links of the base.
@@ -110,17 +111,17 @@ def estimates(
     A mass given for a link whose shape cannot be read counts in the total only.
     """
     stated = structure_of(description, Edits())
-    measured = {name: link.mass for name, link in stated.links.items() if link.mass}
-    masses.check_links(stated.links, measured)
+    stated_masses = {name: link.mass for name, link in stated.links.items() if link.mass}
+    masses.check_links(stated.links, stated_masses)
     for name in masses.by_link:
         if name not in shapes and name not in unread:
-            raise QueryError(f"mass: link {name!r} has no <collision> or <visual> of some volume; add one")
-    without = {name: shape for name, shape in shapes.items() if name not in measured}
-    mass_of = masses.shared(without, sum(measured.values()))
+            raise QueryError(f"mass: link {name!r} has no <collision> or <visual> with a volume; add one")
+    without = {name: shape for name, shape in shapes.items() if name not in stated_masses}
+    mass_of = masses.shared(without, sum(stated_masses.values()))
     new = [_new(name, shapes[name], *mass_of[name]) for name in mass_of if name in shapes]
-    new += [_moments(name, stated.links[name], shapes[name]) for name in shapes if name in measured]
+    new += [_moments(name, stated.links[name], shapes[name]) for name in shapes if name in stated_masses]
     _refuse_massless(stated, {estimate.link for estimate in new}, without)
-    return tuple(new), (*_left_out(without, mass_of), *_unread(unread, masses, measured))
+    return tuple(new), (*_left_out(without, mass_of), *_unread(unread, masses, stated_masses))
 
 
 def marked(description: Description, new: Iterable[Estimate]) -> Description:
@@ -145,7 +146,7 @@ def _new(name: str, shape: LinkShape, mass: float, origin: str) -> Estimate:
 def _moments(name: str, link: StatedLink, shape: LinkShape) -> Estimate:
     """Return the estimate of the moments of a link whose file states its mass."""
     whole = _new(name, shape, link.mass, "of the file")
-    return Estimate(name, whole.body, f"moments alone, of {whole.basis}", moments_only=True)
+    return Estimate(name, whole.body, f"moments only, from {whole.basis}", moments_only=True)
 
 
 def _of_mass(mass: float, body: MassProperties) -> MassProperties:
@@ -158,9 +159,9 @@ def _left_out(without: Mapping[str, LinkShape], mass_of: Mapping[str, Any]) -> I
             yield f"link {name!r}: has a shape but no <inertial>, and no mass was given; it stays massless"
 
 
-def _unread(unread: Mapping[str, str], masses: Masses, measured: Mapping[str, float]) -> Iterator[str]:
+def _unread(unread: Mapping[str, str], masses: Masses, stated_masses: Mapping[str, float]) -> Iterator[str]:
     for name, why in unread.items():
-        no_share = masses.total is not None and name not in masses.by_link and name not in measured
+        no_share = masses.total is not None and name not in masses.by_link and name not in stated_masses
         share = " and no share of the total mass, so the other links are too heavy" if no_share else ""
         remedy = f", or give mass={{{name!r}: …}}" if no_share else ""
         yield f"link {name!r}: its shape cannot be read, so it has no estimate{share}; {why}{remedy}"

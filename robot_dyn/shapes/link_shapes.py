@@ -23,7 +23,13 @@ from robot_dyn.shapes.mesh_files import MeshError
 
 
 class _Bodies(NamedTuple):
-    """Bodies of one element, None without a volume; `closed` is False for a hull; `turned` counts flipped parts."""
+    """Bodies of one element; None if it has no volume.
+
+    Attributes:
+        solid, hull, shell: See `LinkShape`.
+        closed: False if the solid is a convex hull because the mesh is open.
+        turned: Number of parts whose faces were inside out and were flipped.
+    """
 
     solid: MassProperties | None
     hull: MassProperties | None
@@ -96,10 +102,10 @@ class _Reader:
         self._mesh = cache(partial(_of_mesh, allow_overlap=allow_overlap))
 
     def shape(self, kind: str, stated: list[Any]) -> LinkShape | None:
-        """Return the combined bodies of all elements of a kind, None if all have length 0.
+        """Return the combined bodies of all elements of a kind; None if all are primitives with a length of 0.
 
         Raises:
-            MeshError: If one cannot be read, or all of them are flat.
+            MeshError: If one cannot be read, or none has a volume and one is a mesh.
         """
         self.remarks.clear()
         read = [self.bodies(element) for element in stated]
@@ -167,5 +173,5 @@ def _origin(kind: str, stated: list[Any], read: list[_Bodies]) -> str:
     if number := len(closed_meshes) - sum(closed_meshes):
         words.append(f"open {kind} mesh" + ("es, by their convex hulls" if number > 1 else ", by its convex hull"))
     if turned := sum(bodies.turned for bodies in read):
-        words[-1] += f" ({turned} part{'s' * (turned > 1)} turned, whose faces were inside out)"
+        words[-1] += f" ({turned} part{'s' * (turned > 1)} flipped: faces were inside out)"
     return " and ".join(words)

@@ -23,7 +23,7 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.shapes.closed_parts import closed_parts
 from robot_dyn.shapes.mesh_files import MeshError
 
-_FLAT = 1e-9  # relative to the cube of its length: smaller volumes count as none
+_FLAT = 1e-9  # smallest volume of a body, relative to the cube of its length; a smaller one counts as flat
 _ROUNDED = 1.001  # relative to the hull's volume, which a solid exceeds only by float32 rounding
 _NAMED = 3  # maximum number of overlaps in a message
 REMEDY = "export their union, or count the shared volume twice: allow_overlap=True, --allow-overlap"
@@ -112,7 +112,7 @@ def shell(vertices: ndarray, faces: ndarray) -> MassProperties | None:
 
 @np.errstate(all="ignore")
 def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
-    """Return the mass properties of the space inside parts, without cavities; None without a volume.
+    """Return the mass properties of the space inside parts, without cavities; None if they enclose no volume.
 
     Args:
         parts: Corners of the triangles of each closed part, (m, 3, 3), in [m].

@@ -33,7 +33,7 @@ from robot_dyn.description.inertia import MassProperties
 from robot_dyn.description.structure import structure_of
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.spatial import rotation_rpy
-from robot_dyn.shapes.estimate import estimates, marked, shapes_of_lacking
+from robot_dyn.shapes.estimate import estimates, marked, shapes_of_incomplete_links
 from robot_dyn.shapes.masses import Masses
 
 DENSITY = 1160.0  # [kg/m³], the median of the links of the half from which the rules were chosen
@@ -163,7 +163,7 @@ def judged(maker: str, name: str, robot: rd.Robot, package_dirs: tuple[Path, ...
     """The errors of the estimates of one arm, of its links that have a mass and a shape."""
     true = stated(robot.description)
     bare = check(_INERTIAL.sub(b"", robot.description.text), robot.description.source)
-    shapes = {link: shape for link, shape in shapes_of_lacking(bare, package_dirs)[0].items() if link in true}
+    shapes = {link: shape for link, shape in shapes_of_incomplete_links(bare, package_dirs)[0].items() if link in true}
     arm = rd.Robot(_kept(robot.description, shapes.keys()))
     total = sum(true[link].mass for link in shapes)
     of_each = Masses({link: true[link].mass for link in shapes})

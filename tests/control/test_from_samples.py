@@ -207,7 +207,7 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
         (
             table(np.where(np.arange(6) == 2, np.degrees(SMOOTH), SMOOTH)),
             {},
-            r"degrees: elbow.* if those of shoulder_pan_joint are, too, else write .* 'elbow_joint \[deg\]'",
+            r"degrees: elbow.* if shoulder_pan_joint is in degrees, too; else state units, as in 'elbow_joint \[deg\]'",
         ),
         (table(REST, ("elbow", *NAMES[1:])), {}, "column 'elbow' is not a joint; nearest: elbow_joint"),
         ({name: x for name, x in table(REST).items() if name != NAMES[5]}, {}, "no column of wrist_3_joint; nearest:"),

@@ -200,7 +200,7 @@ def test_a_run_of_it_is_read_again(tmp_path: Path) -> None:
 
 def test_errors_name_the_file_and_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(tmp_path, ARM.replace('type="capsule"', 'type="capsul"'))
-    with pytest.raises(DescriptionError, match=r"arm\.xml: MuJoCo refuses it: .*capsul"):
+    with pytest.raises(DescriptionError, match=r"arm\.xml: MuJoCo rejects it: .*capsul"):
         rd.load(path)
     for wrong in ("tendon", {"tendons"}, 3):
         with pytest.raises(DescriptionError, match="without must be a set of tendon, equality, free, ball"):

@@ -79,7 +79,7 @@ def test_primitives_have_their_closed_forms(tmp_path: Path) -> None:
     [
         (slice(None), "closed collision mesh"),
         (slice(1, None), "open collision mesh, by its convex hull"),
-        ((slice(None), slice(None, None, -1)), "closed collision mesh (1 part turned"),  # it is inside out
+        ((slice(None), slice(None, None, -1)), "closed collision mesh (1 part flipped"),  # it is inside out
     ],
 )
 def test_a_mesh_is_the_solid_within_or_its_hull_and_scales(tmp_path: Path, suffix: str, faces: Any, basis: str) -> None:
@@ -186,7 +186,7 @@ def test_moments_alone_are_estimated_where_the_mass_is_stated(tmp_path: Path) ->
     robot = estimated(arm(tmp_path, ROD + stated + ' iyz="0" izz="0"/></inertial>'), density=700)
     rod = solid_cylinder(2.5, 0.05, 0.8)
     same(body(robot, "link1"), MassProperties(2.5, np.array([0, 0, 0.1]), rod.inertia))
-    assert robot.estimated["link1"].startswith("moments alone")
+    assert robot.estimated["link1"].startswith("moments only")
 
 
 def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:

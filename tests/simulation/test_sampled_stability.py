@@ -101,7 +101,7 @@ def test_a_loop_that_is_unstable_at_every_period_says_why(law: rd.control.Contro
     assert advice.longest_period_s == 0.0
     assert not advice.stable
     assert f"unstable; no period is stable: use {remedy}" in advice.text
-    assert (advice.grows_anyway > 0) == (remedy == "other gains")
+    assert (advice.continuous_growth_rate > 0) == (remedy == "other gains")
 
 
 def test_a_step_has_its_limit_however_short_the_run() -> None:
@@ -159,7 +159,7 @@ def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
         return [each.remedy for each in run.remarks if each.kind is RemarkKind.UNSTABLE]
 
     (remedy,) = remarks(1.5 * limit)
-    told = re.search(r"at ([\d.]+) per second; sampling adds to that beyond ([\d.]+) s: use period_s=([\d.]+)", remedy)
+    told = re.search(r"by ([\d.]+) per second; periods beyond ([\d.]+) s add to that: use period_s=([\d.]+)", remedy)
     assert told is not None
     rate, beyond, period = map(float, told.groups())
     falls = float(arm.N([np.pi - 1e-6])[0] - arm.N([np.pi])[0]) / 1e-6  # −∂N/∂q upright

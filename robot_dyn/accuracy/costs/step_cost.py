@@ -1,8 +1,8 @@
-"""Cost of a step of RK4: each part of a setup on and off, one run or many together, numbers as inputs or constants.
+"""Cost of an RK4 step, with and without each part of a setup, for one run or many, with inputs or with constants.
 
 instructions = 4 × instructions of y' = f(t, y), plus those of a tick if the control is sampled
 
-Steps are so short that the motion stays at its start. A sampled controller has a tick at every step.
+Steps are so short that the state hardly changes. A sampled controller has a tick at every step.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from robot_dyn.simulation.run.state import RunState
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
-RUNS = 4096  # many runs together, on one thread
+RUNS = 4096  # number of runs that one thread advances together
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
 EVERYTHING, NUMBERS, SIDE_BY_SIDE = "everything", "numbers of the setup", "runs"
-_EVALUATIONS = 4  # of RK4, in a step
+_EVALUATIONS = 4  # evaluations of y' in a step of RK4
 _IN_LANES = partial(machine_code, extras=())
 _STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
 
 
 def parts(setup: Setup) -> Iterator[tuple[str, Setup]]:
-    """Return every part by name, with the setup without it: gravity, other edits, effects, loop and control.
+    """Yield the name of each part and the setup without it: gravity, other edits, effects, loop and control.
 
     An edit that is removed from the plant is also removed from the models of the controller, because machine code
     computes common terms once.
@@ -64,7 +64,7 @@ def parts(setup: Setup) -> Iterator[tuple[str, Setup]]:
 
 
 def _edits(dynamics: object) -> dict[str, Robot]:
-    """Return the edits of a robot that act, by name, with the robot without each of them."""
+    """Return, for each edit that has an effect, the robot without it, by the name of the edit."""
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         return {}
@@ -85,7 +85,7 @@ def bare(setup: Setup) -> Setup:
 
 
 def pairs_of_parts(setup: Setup) -> Iterator[ABComparison]:
-    """Compare a step with everything on and off, then with each part off.
+    """Yield comparisons of the complete step: first with the bare rigid bodies, then with each part removed.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
@@ -108,7 +108,7 @@ def side_by_side(setup: Setup) -> ABComparison:
 
 
 def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _IN_LANES) -> Version:
-    """Return the version of many runs together, per step and run."""
+    """Return a version that measures many runs together, in seconds per step and run."""
     short = _short(setup, _STEPS_OF_MANY)
     code = translate(_equation(short), short.method, lanes=LANES)
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
@@ -123,7 +123,7 @@ def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _
 
 
 def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Version:
-    """Return the version of one run, per step."""
+    """Return a version that measures one run, in seconds per step."""
     short = _short(setup, _STEPS)
     code = translate(_equation(short), short.method)
 
@@ -142,7 +142,7 @@ def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = mac
 
 
 def instructions(code: MachineCode) -> int:
-    """Return the instructions of a step, without those of the method itself."""
+    """Return the number of instructions in a step, excluding those of the method itself."""
     programs = code.code.programs
     return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
 
@@ -152,7 +152,7 @@ def _equation(setup: Setup) -> StateEquation:
 
 
 def _short(setup: Setup, steps: int) -> Setup:
-    """Return the setup with a number of short steps of RK4, and a tick at every step if the control is sampled."""
+    """Return the setup with short RK4 steps, `steps` of them; a sampled controller gets a tick at every step."""
     controller = setup.controller
     if controller is not None and controller.period_s:
         controller = controller.at_period(_STEP_S)

@@ -9,7 +9,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.application import ASK, RUN, TRUST, bar, command
+from robot_dyn.cli.application import DYNAMICS, SIMULATION, VERIFICATION, bar, command
 from robot_dyn.cli.options import AS_STATED, PRINTED, Budget, Json, Name, Repeats, Results, RobotOptions, Scene
 from robot_dyn.cli.terminal import show
 from robot_dyn.foundations.errors import QueryError
@@ -17,7 +17,7 @@ from robot_dyn.foundations.errors import QueryError
 _DURATION_S = 1.0
 
 
-@command(TRUST)
+@command(VERIFICATION)
 def work_precision(
     what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     /,
@@ -52,7 +52,7 @@ def work_precision(
     results.give(result, paths)
 
 
-@command(ASK)
+@command(DYNAMICS)
 def cost(scene: Scene, /, budget: Budget = 10.0, repeats: Repeats = 25, results: Results = PRINTED) -> None:
     """Count and time what effects, control and terms cost.
 
@@ -65,7 +65,7 @@ def cost(scene: Scene, /, budget: Budget = 10.0, repeats: Repeats = 25, results:
     results.give(result, paths)
 
 
-@command(TRUST)
+@command(VERIFICATION)
 def certify(
     robot: Name,
     /,
@@ -101,14 +101,14 @@ def certify(
     results.give(result, paths)
 
 
-@command(RUN)
+@command(SIMULATION)
 def advise(scene: Scene, /, as_json: Json = False) -> None:
     """Check whether step and control period are short enough.
 
     It also estimates the error. The exit code is 1 if they are not short enough.
     """
     setup = rd.read_scene(scene)
-    with bar(what="looking at the loop"):
+    with bar(description="looking at the loop"):
         advice = rd.advise(setup)
     show(advice, as_json=as_json)
     if not advice.stable:

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.application import LOOK, bar, command
+from robot_dyn.cli.application import INSPECTION, bar, command
 from robot_dyn.cli.options import Force
 from robot_dyn.cli.terminal import say
 from robot_dyn.foundations.errors import QueryError, RobotDynError
@@ -18,7 +18,7 @@ _ERROR, _METHOD = 1e-8, "DOP853"  # [rad]
 _BUDGET_S = 8.0  # compiling not counted, which happens once for a version of the library
 
 
-@command(LOOK)
+@command(INSPECTION)
 def demo(output: str = "demo", force: Force = False) -> None:
     """Load, compare, simulate, replay and plot a real arm.
 
@@ -44,7 +44,7 @@ def demo(output: str = "demo", force: Force = False) -> None:
     files = {end: target(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
     save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
     panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-    with bar(what="comparing"):
+    with bar(description="comparing"):
         tables = list(report.demo_tables(panda))
     say(*tables, "", "The same arm under computed torque, its model 20 % too heavy", "")
     scene = rd.read_scene(files["toml"])
@@ -53,7 +53,7 @@ def demo(output: str = "demo", force: Force = False) -> None:
     if run.outcome.ending == "stopped":
         say(*run.summary.split("\n"))
         raise typer.Exit(130)
-    with bar(what="drawing"):
+    with bar(description="drawing"):
         run.save(files["npz"])
         rd.replay(run).save(files["html"])
         rd.plot(run).save(files["png"])

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.application import LOOK, command
+from robot_dyn.cli.application import INSPECTION, command
 from robot_dyn.cli.options import PRINTED, Results
 
 
-@command(LOOK)
+@command(INSPECTION)
 def diff_runs(a: str, b: str, /, tolerance: float = 1e-06, results: Results = PRINTED) -> None:
     """Compare two runs: when they part, and their settings.
 
     It prints the rms and the largest difference b − a by joint, and the settings that differ. The exit code is 0.
 
     Options:
-        a (A.npz): A run file, as `robot-dyn simulate … -o` writes.
+        a (A.npz): A run file written by `robot-dyn simulate … -o`.
         b (B.npz): A run file of the same robot.
         tolerance: In rad or m: runs without an estimate of their error part beyond it.
     """

@@ -24,6 +24,6 @@ def export(run: str, /, output: str, force: Force = False) -> None:
 
     loaded = rd.read(run)
     path = target(output, kinds(type(loaded)), RunFileError, [run], force)
-    with bar(what="writing"):
+    with bar(description="writing"):
         loaded.save(path)
     say_written(path)

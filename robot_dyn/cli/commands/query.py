@@ -8,7 +8,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.application import ASK, LOOK, TRUST, command, progress
+from robot_dyn.cli.application import DYNAMICS, INSPECTION, VERIFICATION, command, progress
 from robot_dyn.cli.options import AS_STATED, Effects, Json, Name, Payloads, Positions, RobotOptions
 from robot_dyn.cli.terminal import show
 from robot_dyn.foundations.errors import QueryError, RobotDynError
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-@command(LOOK, "list")
+@command(INSPECTION, "list")
 def list_(as_json: Json = False) -> None:
     """List the robots that can be named."""
     names = rd.list_robots()
     show([*names], as_json=as_json, document={"robots": names})
 
 
-@command(LOOK)
+@command(INSPECTION)
 def info(robot: Name, /, compiled: bool = False, options: RobotOptions = AS_STATED, as_json: Json = False) -> None:
     """Show a robot: joints, limits, friction, mass, findings.
 
@@ -44,7 +44,7 @@ def info(robot: Name, /, compiled: bool = False, options: RobotOptions = AS_STAT
         show(answer, as_json=as_json)
 
 
-@command(ASK)
+@command(DYNAMICS)
 def query(
     what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     /,
@@ -113,7 +113,7 @@ def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return equation.actuation(0.0, q, v, z, held)
 
 
-@command(TRUST)
+@command(VERIFICATION)
 def compare(
     robots: Annotated[list[str] | None, typer.Argument(autocompletion=completion.robots)] = None,
     /,

@@ -12,7 +12,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.application import LOOK, bar, command
+from robot_dyn.cli.application import INSPECTION, bar, command
 from robot_dyn.cli.options import AS_STATED, Dark, Force, Name, Positions, RobotOptions
 from robot_dyn.cli.terminal import say, say_written
 from robot_dyn.foundations.errors import QueryError
@@ -31,7 +31,7 @@ class PageOptions:
         html (OUT.html): Write one file that needs no server, and exit.
         inertia: Draw each link's equivalent inertia box.
         meshes: full (all triangles of the files) or coarse (fewer, for a smaller page).
-        port: Where to listen; a free one by default.
+        port: Port of the server; a free one by default.
         open_: Open the page in your browser.
     """
 
@@ -43,7 +43,7 @@ class PageOptions:
     force: Force = False
 
     @property
-    def look(self) -> Any:
+    def appearance(self) -> Any:
         """Arguments of `rd.show` and `rd.replay`."""
         return {"inertia": self.inertia, "meshes": self.meshes}
 
@@ -55,20 +55,20 @@ class PageOptions:
             raise QueryError("give --html or --port, not both: a file needs no server")
         return None if self.html is None else target(self.html, PAGE, ReplayError, inputs, self.force)
 
-    def give(self, page: Page, file: Path | None, what: str) -> None:
+    def write_or_serve(self, page: Page, file: Path | None, content: str) -> None:
         """Write a page to a file, or serve it until Ctrl-C."""
         if file is not None:
-            with bar(what="writing the page"):
+            with bar(description="writing the page"):
                 page.save(file)
-            self.written(file)
+            self.report_written(file)
             return
         with page.serve(self.port) as server, suppress(KeyboardInterrupt):
-            say(f"{server.url} shows the {what}; Ctrl-C ends it")
+            say(f"{server.url} shows the {content}; Ctrl-C ends it")
             self._open(server.url)
             server.wait()
 
-    def written(self, file: Path) -> None:
-        """Print that a file was written, and open it if that is an option."""
+    def report_written(self, file: Path) -> None:
+        """Print the path of a written file, and open it in the browser if `open_` is True."""
         say_written(file)
         self._open(file.absolute().as_uri())
 
@@ -82,19 +82,19 @@ class PageOptions:
 SERVED = PageOptions()
 
 
-@command(LOOK, "show")
+@command(INSPECTION, "show")
 def show_(robot: Name, /, q: Positions = None, view: PageOptions = SERVED, options: RobotOptions = AS_STATED) -> None:
     """Show a robot in the browser, or as one HTML file.
 
-    A server on this machine runs until Ctrl-C.
+    Without --html, a server on this machine runs until Ctrl-C.
     """
     file = view.file([robot])
     loaded = options.load(robot)
     at = arguments.vector("--q", q, loaded.joint_names)
-    view.give(rd.show(loaded, at, package_dirs=options.package_dir or (), **view.look), file, "robot")
+    view.write_or_serve(rd.show(loaded, at, package_dirs=options.package_dir or (), **view.appearance), file, "robot")
 
 
-@command(LOOK)
+@command(INSPECTION)
 def replay(
     runs: list[str],
     /,
@@ -108,12 +108,12 @@ def replay(
 ) -> None:
     """Replay runs in the browser, or as one HTML file or a video.
 
-    A server on this machine runs until Ctrl-C.
+    Without --html and --video, a server on this machine runs until Ctrl-C.
 
     Options:
-        runs (RUN.npz...): Run files; those after the first are drawn transparent.
+        runs (RUN.npz...): Run files; all but the first are drawn transparent.
         video (OUT.mp4): Write an .mp4 or .gif, drawn by an installed Chrome, Chromium or Edge.
-        fps: Frames a second of the video: frame k shows t = k / fps; 60, or 25 of a .gif.
+        fps: Frames per second of the video; frame k shows t = k / fps. Default 60, or 25 for a .gif.
         size (WIDTHxHEIGHT): Pixels of the video; 1280x720 by default.
         frame (LINK): Link whose path is drawn; the tip by default.
         package_dir: Folder in which ROS packages are searched; may be repeated.
@@ -125,17 +125,17 @@ def replay(
             "--dark, --size and --fps apply to a video only; add --video OUT.mp4, or remove them: a page follows the"
             " dark mode of the browser"
         )
-    page = rd.replay(*map(arguments.run, runs), frame=frame, package_dirs=package_dir or (), **view.look)
+    page = rd.replay(*map(arguments.run, runs), frame=frame, package_dirs=package_dir or (), **view.appearance)
     if film is None:
-        view.give(page, file, "run")
+        view.write_or_serve(page, file, "run")
         return
     path, pixels = film
-    with bar(1.0, what="starting the browser", at_the_end="writing") as advance:
+    with bar(1.0, description="starting the browser", at_the_end="writing") as advance:
         page.save_video(path, fps=fps, size=pixels, dark=dark, on_progress=advance)
-    view.written(path)
+    view.report_written(path)
 
 
-@command(LOOK)
+@command(INSPECTION)
 def plot(
     run: str,
     /,
@@ -150,11 +150,11 @@ def plot(
     """Draw a run: joints, torques, energy, tracking, phase, error.
 
     Options:
-        run (RUN.npz): A run file, as `robot-dyn simulate … -o` writes.
+        run (RUN.npz): A run file written by `robot-dyn simulate … -o`.
         output (PLOT.png): A .png, .svg or .pdf; RUN.png by default.
         only (PART): overview, joints, torques, energy, tracking, phase or error_growth; may be repeated; by
             default the overview.
-        joint (JOINT): Show this joint; may be repeated.
+        joint (JOINT): Show only this joint; may be repeated.
         width_mm: Width in mm; text keeps its size.
         paper: For a paper: thin lines, no title, legible in grey.
     """
@@ -162,7 +162,7 @@ def plot(
 
     path = target(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
     look = {"theme": "dark" if dark else "light", "style": "paper" if paper else "screen", "width_mm": width_mm}
-    with bar(what="drawing"):
+    with bar(description="drawing"):
         rd.plot(rd.read(run), only=only or (), joints=joint or None, **look).save(path)
     say(f"written: {path}")
 
@@ -173,7 +173,7 @@ def _film(video: str, size: str, view: PageOptions, inputs: list[str]) -> tuple[
     from robot_dyn.view.video.video import KINDS
 
     if view.html is not None or view.port is not None:
-        raise QueryError("give --video, --html or --port, not several")
+        raise QueryError("give only one of --video, --html and --port")
     if not re.fullmatch("[0-9]+x[0-9]+", size):
         raise QueryError(f"--size must be WIDTHxHEIGHT in pixels, such as 1280x720, got {size!r}")
     width, _, height = size.partition("x")

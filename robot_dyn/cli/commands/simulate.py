@@ -11,14 +11,14 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import completion
-from robot_dyn.cli.application import ASK, FILES, RUN, bar, command
+from robot_dyn.cli.application import DYNAMICS, FILES, SIMULATION, bar, command
 from robot_dyn.cli.options import Force, Json, Scene
 from robot_dyn.cli.terminal import put, say, show
 from robot_dyn.foundations.answer import Table
 from robot_dyn.foundations.files import target
 
 
-@command(RUN)
+@command(SIMULATION)
 def simulate(
     scene: Scene,
     /,
@@ -57,13 +57,13 @@ def simulate(
         raise typer.Exit(130 if run.outcome.ending == "stopped" else 1)
 
 
-@command(ASK)
+@command(DYNAMICS)
 def explain(scene: Scene, /, as_json: Json = False) -> None:
     """Print a scene's equation and the source of each number."""
     show(rd.explain(Path(scene)), as_json=as_json)
 
 
-@command(ASK)
+@command(DYNAMICS)
 def parameters(scene: Scene, /, as_json: Json = False) -> None:
     """List the parameters of a scene that a sweep can vary."""
     show(rd.parameters(rd.read_scene(scene)), as_json=as_json)

@@ -30,7 +30,7 @@ def subscript(f: Function, x: ArrayValue, node: ast.Subscript) -> Value:
 def store_at(f: Function, x: ArrayValue, node: ast.Subscript, value: Value) -> None:
     """Write an entry, or one number into all entries of a view."""
     if x.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
+        raise f.refused(node, "a write into a read-only array", "pass a writable one")
     places, converted_value = _places(f, x, node), converted(f, scalar(f, value, node), x.kind.of, node)
     if all(isinstance(place, Scalar) for place in places):
         store(f, x, [place for place in places if isinstance(place, Scalar)], converted_value)

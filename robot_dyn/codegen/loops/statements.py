@@ -57,7 +57,7 @@ def _store(f: Function, target: ast.expr, value: Value, node: ast.AST) -> None:
         f.assign(target.id, value, node)
     elif isinstance(target, ast.Tuple | ast.List):
         if not isinstance(value, TupleValue) or len(value.items) != len(target.elts):
-            raise f.refused(node, "unpacking of a value of another length", "use a tuple of that length")
+            raise f.refused(node, "unpacking into another number of names", "use a tuple with one item for each name")
         for part, item in zip(target.elts, value.items, strict=True):
             _store(f, part, item, node)
     elif isinstance(target, ast.Subscript) and isinstance(x := f.expression(target.value), ArrayValue):
@@ -67,7 +67,7 @@ def _store(f: Function, target: ast.expr, value: Value, node: ast.AST) -> None:
 
 
 def _augmented(f: Function, node: ast.AugAssign) -> bool:
-    """Compile x op= y, computing the place of x only once."""
+    """Compile x op= y; the indices of x are evaluated only once."""
     op, target = type(node.op), node.target
     if isinstance(target, ast.Name):
         x = numbers.scalar(f, f.name(ast.copy_location(ast.Name(target.id, ast.Load()), target)), node)
@@ -78,7 +78,7 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
     if not isinstance(array, ArrayValue) or not isinstance(target, ast.Subscript):
         raise f.refused(node, f"an assignment to {ast.unparse(target)}", "assign to names and entries of arrays")
     if array.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
+        raise f.refused(node, "a write into a read-only array", "pass a writable one")
     places = arrays.indices(f, array, target)
     x = arrays.load(f, array, places)
     new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
@@ -147,7 +147,7 @@ def _for(f: Function, node: ast.For) -> bool:
 
 @contextmanager
 def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, tuple[ir.Block, ir.Block]]]:
-    """Write a loop over a range: yield its index, and the blocks of the next iteration and after the loop."""
+    """Compile a loop over a range; yield its index and two blocks: the next iteration, and the code after the loop."""
     b = f.builder
     slot = UNWRITTEN if f.silent else _slot(b)
     b.store(start.ir, slot)
@@ -173,7 +173,7 @@ def _slot(b: Builder) -> ir.Value:
 
 
 def _range(f: Function, node: ast.expr) -> tuple[Scalar, Scalar, int] | None:
-    """Return start, end and step of a range."""
+    """Return start, stop and step of a call of range; None for any other expression."""
     if not isinstance(node, ast.Call):
         return None
     function = f.expression(node.func)
@@ -185,7 +185,7 @@ def _range(f: Function, node: ast.expr) -> tuple[Scalar, Scalar, int] | None:
     start, stop = (number(0), bounds[0]) if len(bounds) == 1 else bounds[:2]
     step = bounds[2] if len(bounds) == 3 else number(1)
     if not step.const:
-        raise f.refused(node, "a range whose step is not a constant other than 0", "write a while loop")
+        raise f.refused(node, "a range whose step is 0 or not a constant", "write a while loop")
     return start, stop, int(step.const)
 
 
@@ -222,7 +222,7 @@ def _return(f: Function, node: ast.Return) -> bool:
 
 
 def _expression(f: Function, node: ast.Expr) -> bool:
-    if not isinstance(node.value, ast.Constant):  # a docstring
+    if not isinstance(node.value, ast.Constant):  # a docstring compiles to nothing
         f.expression(node.value)
     return False
 

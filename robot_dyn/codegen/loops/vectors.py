@@ -46,7 +46,7 @@ def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> 
                     node, "a primitive of arrays that are not contiguous or differ in type", "copy them first"
                 )
     if to.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
+        raise f.refused(node, "a write into a read-only array", "pass a writable one")
 
 
 def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, ir.Value]]:

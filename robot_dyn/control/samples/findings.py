@@ -23,7 +23,7 @@ _MOVES = 1e-6  # [rad] or [m]: a joint with a larger range moves
 _LATE_S, _LATE = 1000.0, 10  # [s] and durations: a later start is probably a clock time
 _ROUNDING = 1e-9  # rounding by which a sample may exceed a limit
 DENSE = 16  # smallest number of samples from which ends at rest, noise and errors can be judged
-_AT_REST = 0.05  # fraction of the largest speed of a joint
+_AT_REST = 0.05  # fraction of the largest speed of a joint, below which it is at rest
 _NOISY = 0.1  # largest fraction of noise in the rms acceleration
 _ROUNDED = 1e-12  # [rad] or [m]: rounding of float64, not noise of a sensor
 
@@ -34,7 +34,7 @@ def refuse_other_units(table: Recorded) -> None:
     if len(t) < 2:
         return
     _refuse_degrees(table)
-    if not table.of_time and np.abs(t - np.round(t)).max() <= _WHOLE and _slow(joined_turns(table).table):
+    if not table.has_time_unit and np.abs(t - np.round(t)).max() <= _WHOLE and _slow(joined_turns(table).table):
         raise PlanError(
             f"times may be in ms, µs or ns: they are integers, {np.median(table.dt):.6g} apart, and no joint reaches"
             " 1 % of its speed limit; state the unit in the heading, such as 't [ms]' or 't [s]'"
@@ -48,8 +48,8 @@ def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterato
     position, velocity = extreme_values(reference), extreme_values(reference, 1)
     for i, name in enumerate(arm.joint_names):
         unit, limit = table.unit(i), table.limit[i]
-        if not table.given[i]:
-            yield f"{name} has no samples and rests at {table.q[0, i]:g} {unit}; give a column if it moves"
+        if not table.has_column[i]:
+            yield f"{name} has no samples and rests at {table.q[0, i]:g} {unit}; add a column if it moves"
             continue
         yield from turned(turns, i)
         jumps = list(_jumps(turns, i))
@@ -74,8 +74,8 @@ def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterato
 
 
 def _refuse_degrees(table: Recorded) -> None:
-    """Raise a PlanError if angles without a stated unit are beyond the limits, but within them as degrees."""
-    arm, unknown = table.arm, ~table.stated & table.given
+    """Raise a PlanError if angles without a stated unit exceed the limits, but would not if they were in degrees."""
+    arm, unknown = table.arm, ~table.stated & table.has_column
     if not unknown.any():
         return
     most = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
@@ -89,10 +89,10 @@ def _refuse_degrees(table: Recorded) -> None:
         i, others = int(of_degrees.argmax()), np.flatnonzero(unknown & ~of_degrees)
         name, remedy = arm.joint_names[i], "give unit='deg'"
         if len(others):
-            remedy += f" if those of {arm.joint_names[others[0]]} are, too, else write headings such as '{name} [deg]'"
+            remedy += f" if {arm.joint_names[others[0]]} is in degrees, too; else state units, as in '{name} [deg]'"
         raise PlanError(
             f"angles look like degrees: {name} reaches {far[i]:.4g}, at up to {speed[:, i].max():.4g} per second;"
-            f" {remedy}, or unit='rad' if all are in rad; --unit on the command line"
+            f" {remedy}; give unit='rad' if all are in rad (--unit on the command line)"
         )
 
 
@@ -111,10 +111,10 @@ def _of_times(table: Recorded, reference: PiecewisePolynomial) -> Iterator[str]:
             f"{gaps} gap{'s' * (gaps > 1)} in time, the longest of {dt[longest]:.4g} s from {t[longest]:.6g} s, while"
             f" samples are {middle:.4g} s apart: the spline is a guess there; add samples"
         )
-    if not table.of_time and (len(t) >= DENSE or middle > 1) and _slow(table):
+    if not table.has_time_unit and (len(t) >= DENSE or middle > 1) and _slow(table):
         yield (
-            f"no joint reaches 1 % of its speed limit in {t[-1] - t[0]:.6g} s, samples are {middle:.4g} s apart: are"
-            f" the times in ms? State the unit in the heading, such as 't [ms]' or 't [s]'"
+            f"no joint reaches 1 % of its speed limit in {t[-1] - t[0]:.6g} s, and samples are {middle:.4g} s apart:"
+            f" are the times in ms? State the unit in the heading, such as 't [ms]' or 't [s]'"
         )
     start, duration = reference.start_s, reference.end_s - reference.start_s
     if start < 0 or start > max(_LATE_S, _LATE * duration):
@@ -122,7 +122,7 @@ def _of_times(table: Recorded, reference: PiecewisePolynomial) -> Iterator[str]:
 
 
 def turned(turns: Turns, i: int) -> Iterator[str]:
-    """Yield a finding about whole turns of a joint recorded within one turn: unwrapped, or unclear."""
+    """Yield a finding if the angles of a joint were unwrapped, or if the direction of a large step is ambiguous."""
     table, joined = turns.recorded, turns.joined[i]
     steps = (turns.steps if joined else turns.unclear)[:, i]
     if not steps.any():
@@ -177,7 +177,7 @@ def refuse_moving_ends(table: Recorded) -> None:
 
 
 def _ends(table: Recorded) -> Iterator[str]:
-    """Yield the joint that moves fastest at the start, and at the end, of dense samples, unless nearly at rest."""
+    """Yield a sentence about the fastest joint at each end of dense samples, unless it is nearly at rest."""
     speed = np.abs(table.speed)
     for where, k in (("start", 0), ("end", -1)) if len(table.t) >= DENSE else ():
         i = int(speed[k].argmax())
@@ -187,10 +187,11 @@ def _ends(table: Recorded) -> Iterator[str]:
 
 
 def _noise(turns: Turns) -> Iterator[str]:
-    """Yield a finding about the joint whose acceleration noise affects most, if it does; whole turns are skipped.
+    """Yield a finding about the joint whose acceleration is affected most by noise, if its part exceeds 10 %.
 
-    Independent errors of deviation σ have fourth divided differences of σ times the norm of the weights, large against
-    those of a smooth motion at small steps. Second divided differences are halves of accelerations.
+    Fourth divided differences of independent errors have an rms of σ times the norm of their weights. At small steps
+    this is large compared with those of a smooth motion. A second divided difference is half an acceleration. Joints
+    whose turns were not joined or are unclear are skipped.
     """
     table = turns.table
     if len(table.t) < DENSE:
@@ -210,8 +211,8 @@ def _noise(turns: Turns) -> Iterator[str]:
         also = f" (and {others} other joint{'s' * (others > 1)})" * bool(others)
         yield (
             f"{table.arm.joint_names[i]}{also}: noise or rounding of {noise[i]:.1g} {unit}, or inexact times, cause"
-            f" accelerations of {by_noise[i]:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and torques with"
-            " them; smooth the samples first, for example by scipy.signal.savgol_filter"
+            f" accelerations of {by_noise[i]:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and"
+            " wrong torques; smooth the samples first, for example by scipy.signal.savgol_filter"
         )
 
 

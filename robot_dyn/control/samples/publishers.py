@@ -28,7 +28,7 @@ def refuse_alternating(table: Recorded) -> None:
     to_or_back = np.pad(apart, ((0, 1), (0, 0))) | np.pad(apart, ((1, 0), (0, 0)))
     interleaved = apart.sum(axis=0) >= max(_FEW, _PART * len(steps))
     interleaved &= (fast & to_or_back).sum(axis=0) >= _MOST * fast.sum(axis=0)
-    for i in np.flatnonzero(interleaved & table.given)[:1]:
+    for i in np.flatnonzero(interleaved & table.has_column)[:1]:
         k = int(apart[:, i].argmax())
         q, unit = table.q[k : k + 3, i], table.unit(int(i))
         raise PlanError(

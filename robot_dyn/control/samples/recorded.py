@@ -42,8 +42,8 @@ class Recorded:
         t: Times, (m,), in [s].
         q: Positions, (m, n), in [m] or [rad]; unconverted where the unit is unknown.
         stated: True for joints with a known unit, (n,).
-        given: True for joints with a column, (n,); the others rest at q0.
-        of_time: True if the unit of the times is known.
+        has_column: True for joints with a column, (n,); the others rest at q0.
+        has_time_unit: True if the unit of the times is known.
         more: v and a, (m, n), if the table is the export of a run.
         note: Topic and origin of the times of a log, and columns of texts, which are skipped.
     """
@@ -52,8 +52,8 @@ class Recorded:
     t: np.ndarray
     q: np.ndarray
     stated: np.ndarray
-    given: np.ndarray
-    of_time: bool
+    has_column: np.ndarray
+    has_time_unit: bool
     more: dict[str, np.ndarray]
     note: str
 
@@ -93,7 +93,7 @@ def recorded(
     if joints is not None:
         instance("joints", joints, Mapping, "give the column of each joint, {joint: column}", error=PlanError)
     table = table_of(source, arm.joint_names, joints or {}, topic, time)
-    heads, t, of_time = _times(table, time, least)
+    heads, t, has_time_unit = _times(table, time, least)
     at = _joints(arm, heads, joints)
     skipped = [head for head, column in heads.items() if head not in at.values() and is_text(column)]
     note = "; ".join([table.note] * bool(table.note) + [f"without the texts of {shown(skipped)}"] * bool(skipped))
@@ -114,7 +114,8 @@ def recorded(
                     " correct or remove it"
                 )
     more = {} if joints is not None else _rates(arm, heads, unit)
-    return Recorded(arm, t, q, stated, np.array([name in at for name in arm.joint_names]), of_time, more, note)
+    has_column = np.array([name in at for name in arm.joint_names])
+    return Recorded(arm, t, q, stated, has_column, has_time_unit, more, note)
 
 
 def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:

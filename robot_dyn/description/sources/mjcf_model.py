@@ -35,11 +35,11 @@ class Compiled:
 
     def name(self, kind: str, index: int) -> str:
         """Return the name of a body, joint, mesh …; for example body_3 if it has none."""
-        kinds = getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
-        return (self.mujoco.mj_id2name(self.model, kinds, index) or "").strip() or f"{kind}_{index}"
+        kind_number = getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return (self.mujoco.mj_id2name(self.model, kind_number, index) or "").strip() or f"{kind}_{index}"
 
     def disabled(self, *flags: str) -> bool:
-        """Return True if `<option>` disables one of these flags, where this version of MuJoCo has the flag."""
+        """Return True if `<option>` disables one of these flags; flags unknown to this MuJoCo do not count."""
         bits = (int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
         return any(int(self.model.opt.disableflags) & bit for bit in bits)
 
@@ -55,15 +55,15 @@ def compile_model(path: Path) -> Compiled:
 
     Raises:
         MissingExtraError: If MuJoCo is not installed.
-        DescriptionError: If MuJoCo refuses the file.
+        DescriptionError: If MuJoCo rejects the file.
     """
     mujoco: Any = needs("mujoco", extra="mjcf")
     with _warnings(mujoco) as warnings:
         try:
             model = mujoco.MjModel.from_xml_path(str(path))
             meshes = mujoco.MjSpec.from_file(str(path)).meshes if model.nmesh else ()
-        except Exception as error:  # ValueError of the compiler, and those of its readers of meshes
-            raise DescriptionError(f"{path}: MuJoCo refuses it: {shorten(' '.join(str(error).split()), 300)}") from None
+        except Exception as error:  # ValueError from the compiler, and errors from its mesh readers
+            raise DescriptionError(f"{path}: MuJoCo rejects it: {shorten(' '.join(str(error).split()), 300)}") from None
     references = {mesh.name or Path(mesh.file).stem: (mesh.refpos.copy(), mesh.refquat.copy()) for mesh in meshes}
     sentences = (f"MuJoCo warns: {shorten(' '.join(text.split()), 300)}" for text in dict.fromkeys(warnings))
     return Compiled(mujoco, model, path, references, tuple(sentences))

@@ -82,7 +82,7 @@ def expand(path: Path, arguments: Mapping[str, str | float | bool], package_dirs
         last = shorten((child.stderr.splitlines() or ["no memory or no time left"])[-1], 200)
         raise DescriptionError(f"{path}: the expansion ended without a result ({last}); simplify its macros") from None
     if "error" in result:
-        raise DescriptionError(f"{path}: xacro refuses it: {shorten(result['error'], 400)}; {result['remedy']}")
+        raise DescriptionError(f"{path}: xacro rejects it: {shorten(result['error'], 400)}; {result['remedy']}")
     for name in result["unknown"]:
         raise DescriptionError(f"{path}: xacro has no argument {name!r} in it; {nearest(name, result['known'])}")
     warnings = [f"xacro: {shorten(line, 200)}" for line in dict.fromkeys(warnings)]

@@ -11,15 +11,15 @@ from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
-_JUMP = 0.01  # of the range of a reference, or of its largest velocity
-_ROUNDING = 1e-9  # of a position
-_TIMES = 2000  # at which a reference is evaluated
+_JUMP = 0.01  # smallest jump remarked on, relative to the range of a reference or its largest velocity
+_ROUNDING = 1e-9  # relative rounding of a position
+_TIMES = 2000  # number of times at which a reference is evaluated
 
 Units = list[tuple[str, str, str]]
 
 
 def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterator[tuple[Remark, np.ndarray]]:
-    """Yield the joints whose reference starts at another position or velocity than the joint.
+    """Yield a remark on each joint that starts at another position or velocity than its reference.
 
     A reference rests before its first break. A reference that always rests is a set point, which may be anywhere. Each
     remark concerns the run with the largest jump; it comes with the jumps of all runs, (B,), 0 for none.
@@ -47,8 +47,8 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
             yield Remark(RemarkKind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, facts=facts), gaps[:, i]
 
 
-def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
-    """Yield the joints that dry friction holds at every step while their reference moves.
+def held_by_friction(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
+    """Yield a remark on each joint that dry friction holds at every step while its reference moves.
 
     Args:
         setup: The setup of the run.

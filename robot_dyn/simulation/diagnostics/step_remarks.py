@@ -15,7 +15,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit
-from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
+from robot_dyn.simulation.diagnostics.reference_remarks import held_by_friction, jumps
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.guard_levels import Level
 from robot_dyn.simulation.observation.observation import Observed, Visit
@@ -69,7 +69,7 @@ def remarks(
 def of_reference(setup: Setup, t: np.ndarray, extremes: np.ndarray, units: Units) -> Iterator[Remark]:
     """Yield remarks on the reference of a run, with extremes (3, 2, n) of its steps and samples at times t (m,)."""
     yield from (remark for remark, _ in jumps(setup, setup.q0[None], setup.v0[None], units))
-    yield from held(setup, extremes, t, units)
+    yield from held_by_friction(setup, extremes, t, units)
 
 
 def of_steps(

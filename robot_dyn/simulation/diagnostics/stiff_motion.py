@@ -1,4 +1,4 @@
-"""Stiff motion: remarks on runs that another method continued, on steps limited by stability, and damped oscillations.
+"""Remarks on stiff motion: a change of method during a run, steps limited by stability, and damped oscillations.
 
 A stiff method damps oscillations of more than a radian a step, and its steps do not show them.
 [Hairer, Wanner 1996, IV.2, p. 21]
@@ -23,9 +23,9 @@ _LEAST_STEPS = 1000  # shortest run that is checked
 _CHECKED = 9  # steps that are checked
 
 
-def replacement(given_up: Stiff | Accumulation) -> Remark:
+def replacement(cause: Stiff | Accumulation) -> Remark:
     """Return the remark on a run that another method continued."""
-    match given_up:
+    match cause:
         case Stiff(t, motion):
             return _limited(motion, t, t, before=EXPLICIT)
         case Accumulation(joint, start, t, speed, changes, span_s):
@@ -36,8 +36,8 @@ def replacement(given_up: Stiff | Accumulation) -> Remark:
 def limited_by_stability(setup: Setup, record: Recording) -> tuple[Remark, ...]:
     """Return a remark if stability, rather than the tolerance, limits the steps of an explicit method.
 
-    The criterion: in most of the steps checked, h |λ| is near the end of the stability domain, where λ is the fastest
-    decay.
+    In most of the checked steps, h |λ| must be near the boundary of the stability region; λ is the eigenvalue of the
+    fastest decay.
     """
     method, t = setup.method, record.step_log.t
     explicit = method.controls_error and method.plain and not method.needs_jacobian
@@ -64,12 +64,12 @@ def damped_oscillation(setup: Setup, record: Recording) -> Fastest | None:
 def _motions(
     setup: Setup, record: Recording, rows: np.ndarray, *, oscillation: bool = False
 ) -> Iterator[tuple[Fastest, int]]:
-    """Yield the fastest motion at the start of these steps, where it exists, with the number of the step."""
+    """Yield the fastest motion at the start of each of these steps, if it exists, and the index of the step."""
     equation, path = setup.equation, record.step_log
-    held = np.zeros(equation.plant.dynamics.n) if equation.sampled else None
+    actuation = np.zeros(equation.plant.dynamics.n) if equation.sampled else None
     for k in rows:
         try:
-            yield fastest(equation, float(path.t[k]), path.y[k], held, oscillation=oscillation), k
+            yield fastest(equation, float(path.t[k]), path.y[k], actuation, oscillation=oscillation), k
         except (RobotDynError, np.linalg.LinAlgError):
             continue
 

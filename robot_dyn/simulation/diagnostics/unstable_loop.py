@@ -3,8 +3,8 @@
     sampled      δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} without sampling
     continuous   δx' = J δx:   max Re λ(J) > 0, and more than twice as fast as with the actuation held
 
-Slow growth may end before it shows. Growth explains a divergence at t if deviations grow by more than 1e3 until t.
-Shorter steps follow such growth more closely and do not end it, so the remedy concerns the loop.
+A run may end before slow growth is visible. Growth explains a divergence at t if deviations grow by a factor of more
+than 1e3 by then. Shorter steps compute such growth more accurately but do not stop it, so the remedy changes the loop.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.setup.setup import Setup
 
 _GAINS = ("kp", "ki", "kd")
-_HALVINGS = 20  # of the gains, tried for a stable loop
+_HALVINGS = 20  # number of times the gains are halved in search of a stable loop
 
 
 def unstable(
@@ -50,7 +50,7 @@ def unstable(
     rows = sorted({int(k) for k in finite[[0, len(finite) // 2, -1]]}) if len(finite) else []
     if end is None:
         end = float(t[finite[-1]]) if len(t) > 1 and len(finite) else setup.duration_s
-    for k in rows:  # only the first unstable one is reported: later states may be far out
+    for k in rows:  # only the first unstable one is reported: later states may be far from the motion
         if growing := growing_loop(setup, float(t[k]), y[k]):
             yield growing.remark(setup, remedies, end)
             return
@@ -61,8 +61,8 @@ class GrowingLoop(NamedTuple):
 
     Attributes:
         t: Time of the state it is linearised about, in [s].
-        joint: Index of the joint that takes part most.
-        rate: Growth: the factor in each period, or of a continuous loop the rate in [1/s].
+        joint: Index of the joint with the largest part in the growing deviation.
+        rate: Growth factor per period of a sampled loop, or growth rate of a continuous loop in [1/s].
         loop: Linearisation.
     """
 
@@ -72,7 +72,7 @@ class GrowingLoop(NamedTuple):
     loop: SampledLoop
 
     def remark(self, setup: Setup, remedies: bool, end: float) -> Remark:
-        """Return the remark about it up to the end reached, in [s], with facts for its remedy if `remedies`."""
+        """Return the remark on this loop in a run up to time `end`, in [s]; with facts for a remedy if `remedies`."""
         assert setup.controller is not None
         period, joint, t = setup.controller.period_s, setup.plant.dynamics.joint_names[self.joint], self.t
         facts: dict[str, float | str]
@@ -85,21 +85,21 @@ class GrowingLoop(NamedTuple):
         return Remark(RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, self.rate, 1.0 if period else 0.0, facts=facts)
 
     def _other_period(self, period_s: float) -> dict[str, float | str]:
-        """Return the longest stable period of a sampled loop, or how it grows with any period."""
+        """Return the facts for a remedy of a sampled loop: a longest period, or other gains if none helps."""
         if limit := self.loop.longest_period(period_s):
             return {"limit_s": limit, "shorter_s": below(limit)}
-        anyway = self.loop.grows_anyway()
-        limit = self.loop.longest_that_adds_none(period_s) if anyway else 0.0
+        continuous_rate = self.loop.continuous_growth_rate()
+        limit = self.loop.longest_period_without_added_growth(period_s) if continuous_rate else 0.0
         if 0 < limit < inf:
-            return {"anyway": anyway, "limit_s": limit, "shorter_s": below(limit)}
-        return {"otherwise": remedy(anyway)}
+            return {"continuous_rate": continuous_rate, "limit_s": limit, "shorter_s": below(limit)}
+        return {"otherwise": remedy(continuous_rate)}
 
     def _lower_gains(self) -> dict[str, float | str]:
-        """Return the part s of the gains with which A + s B K is stable, tried for s = ½, ¼ and so on."""
+        """Return the largest part s = ½, ¼, … of the gains with A + s B K stable; empty if all are unstable."""
         A, closed = self.loop.A, self.loop.continuous
         if closed.shape == A.shape:
             for s in 0.5 ** np.arange(1, _HALVINGS + 1):
-                if replace(self.loop, continuous=A + s * (closed - A)).grows_anyway() == 0.0:
+                if replace(self.loop, continuous=A + s * (closed - A)).continuous_growth_rate() == 0.0:
                     return {"stable_with": float(s)}
         return {}
 
@@ -107,8 +107,8 @@ class GrowingLoop(NamedTuple):
 def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
     """Return the loop about a state y of a run if deviations grow there because of the control; otherwise None.
 
-    If they grow without it too, for example for an arm that falls, it must make them grow twice as fast. "Without it"
-    means continuous control for a sampled loop, and constant actuation for a continuous loop.
+    If they also grow without it, for example in a falling arm, the control must make them grow twice as fast. Here,
+    "without it" means continuous control for a sampled loop, and constant actuation for a continuous loop.
     """
     controller, equation, n = setup.controller, setup.equation, setup.plant.dynamics.n
     motion = equation.equation_of_motion
@@ -129,8 +129,8 @@ def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
             values, vectors = np.linalg.eig(loop.matrix(period))
             worst = vectors[:, int(np.argmax(np.abs(values)))]
             return GrowingLoop(t, _joint(worst, n, period), loop.factor(period), loop)
-        rate = loop.grows_anyway()
-        if not rate > 2 * replace(loop, continuous=loop.A).grows_anyway():
+        rate = loop.continuous_growth_rate()
+        if not rate > 2 * replace(loop, continuous=loop.A).continuous_growth_rate():
             return None
         values, vectors = np.linalg.eig(loop.continuous)
         return GrowingLoop(t, _joint(vectors[:, int(np.argmax(np.real(values)))], n, 1 / rate), rate, loop)
@@ -138,7 +138,7 @@ def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
 
 
 def _joint(deviation: np.ndarray, n: int, time_s: float) -> int:
-    """Return the index of the joint that takes part most in a deviation (δq, δv, …) that grows within a time."""
+    """Return the index of the joint with the largest part in a deviation (δq, δv, …) that grows in `time_s`."""
     return int(np.argmax(np.abs(deviation[:n]) + time_s * np.abs(deviation[n : 2 * n])))
 
 
@@ -160,8 +160,8 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
             return _because(Reason.STEP_TOO_LONG, outcome.t, remark)
         if remark.kind is RemarkKind.UNSTABLE and setup.controller is not None:
             period = setup.controller.period_s
-            grown = periods(outcome.t, period) * log(remark.value) if period else outcome.t * remark.value
-            if grown > log(EXPLAINS):
+            log_growth = periods(outcome.t, period) * log(remark.value) if period else outcome.t * remark.value
+            if log_growth > log(EXPLAINS):
                 return _because(Reason.CONTROL_LOOP_UNSTABLE, outcome.t, remark)
     return outcome
 

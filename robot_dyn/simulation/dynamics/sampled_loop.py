@@ -69,7 +69,7 @@ class SampledLoop:
         """Return the factor by which deviations grow in each period in the long run."""
         return self.growth(period_s).factor ** (1 / self.ticks)
 
-    def grows_anyway(self) -> float:
+    def continuous_growth_rate(self) -> float:
         """Return the rate in [1/s] at which deviations grow under continuous control; 0 if they do not."""
         rates = np.linalg.eigvals(self.continuous)
         fastest = float(rates.real.max())
@@ -89,10 +89,10 @@ class SampledLoop:
     def adds_growth(self, period_s: float) -> bool:
         """Return True if deviations grow by at least twice the rate under continuous control, which may be 0."""
         growth = self.growth(period_s)
-        least = 2 * self.grows_anyway() * period_s * self.ticks
+        least = 2 * self.continuous_growth_rate() * period_s * self.ticks
         return growth.verdict is Stability.UNSTABLE and log(growth.factor) >= least
 
-    def longest_that_adds_none(self, also: float = 0.0) -> float:
+    def longest_period_without_added_growth(self, also: float = 0.0) -> float:
         """Return the period up to which sampling adds no growth, in [s]; see `adds_growth` and `longest_period`."""
         return first_unstable(self.adds_growth, self._tried(also))
 
@@ -111,10 +111,12 @@ class SampledLoop:
         return beyond.least > 10 * beyond.doubt
 
 
-def remedy(grows_anyway: float) -> str:
+def remedy(continuous_growth_rate: float) -> str:
     """Return the remedy for a loop that no period makes stable, by the growth under continuous control in [1/s]."""
     return (
-        "other gains: it is unstable under control at all times, too" if grows_anyway else "lower gains, or less delay"
+        "other gains: it is unstable even under continuous control"
+        if continuous_growth_rate
+        else "lower gains, or less delay"
     )
 
 

@@ -108,13 +108,13 @@ def observe(observation: Observation, began: float, t: float, q: Array, v: Array
     if acted:
         tick(observation.chatter, began, u, observation.low[2 * n :], observation.high[2 * n :])
     observe_motion(observation, began, t, q, v)
-    look(observation, 2 * n, u, began, t, began)
+    update_range(observation, 2 * n, u, began, t, began)
 
 
 def observe_motion(observation: Observation, began: float, t: float, q: Array, v: Array) -> None:
     """Add a step from `began` to t without its actuation; see `observe` for the arguments."""
-    look(observation, 0, q, began, t, t)
-    look(observation, len(q), v, began, t, t)
+    update_range(observation, 0, q, began, t, t)
+    update_range(observation, len(q), v, began, t, t)
 
 
 def observe_actuation(observation: Observation, t: float, u: Array, acted: bool) -> None:
@@ -122,12 +122,15 @@ def observe_actuation(observation: Observation, t: float, u: Array, acted: bool)
     first = 2 * len(u)
     if acted:
         tick(observation.chatter, observation.latest[0], u, observation.low[first:], observation.high[first:])
-    look(observation, first, u, observation.latest[0], t, t)
+    update_range(observation, first, u, observation.latest[0], t, t)
     observation.latest[0] = t
 
 
-def look(observation: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
-    """Add rows x (n, W), from row `first` on, of a step from `began` to t; x is the value at the time `at`."""
+def update_range(observation: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
+    """Update the extremes and level visits in rows `first` onwards with values x (n, W) of a step from `began` to t.
+
+    The values are those at the time `at`.
+    """
     for j in range(len(x)):
         row = first + j
         if enclose(

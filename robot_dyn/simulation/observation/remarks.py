@@ -115,10 +115,10 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         ),
         (
             (
-                "under control at all times they grow, too, at {anyway:.3g} per second; sampling adds to that beyond "
-                "{limit_s:.3g} s: use period_s={shorter_s}, or lower gains",
+                "they also grow under continuous control, by {continuous_rate:.3g} per second; periods beyond "
+                "{limit_s:.3g} s add to that: use period_s={shorter_s}, or lower gains",
                 "the loop is stable up to {limit_s:.3g} s: use period_s={shorter_s}, or lower gains",
-                "so it is with every period: use {otherwise}",
+                "no period makes it stable: use {otherwise}",
                 "lower the gains: about this state the loop is stable with {stable_with:.3g} times these",
                 "use a shorter period than {period_s:g} s, or lower gains",
                 "lower the gains",

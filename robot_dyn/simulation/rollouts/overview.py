@@ -10,7 +10,7 @@ import numpy as np
 from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.queries.units import unit
-from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
+from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held_by_friction, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import (
     KINDS,
     QUANTITIES,
@@ -148,7 +148,7 @@ def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
         plant, controller = runs._parts(setup, run)
         of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]})
-        for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended_s[run]], units(runs)):
+        for remark in held_by_friction(of_run, extremes[run], runs.t[runs.t <= runs.ended_s[run]], units(runs)):
             by_joint.setdefault(remark.joint, []).append((run, remark))
     for pairs in by_joint.values():
         worst, remark = max(pairs, key=lambda pair: pair[1].limit or 0.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_dyn.description import Description
-from robot_dyn.shapes import Estimate, Masses, estimates, shapes_of_lacking
+from robot_dyn.shapes import Estimate, Masses, estimates, shapes_of_incomplete_links
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
@@ -29,7 +29,7 @@ def missing_inertials(
     """
     new = dict[str, Estimate]()
     if masses is not None:
-        shapes, unread = shapes_of_lacking(description, package_dirs, masses.allow_overlap)
+        shapes, unread = shapes_of_incomplete_links(description, package_dirs, masses.allow_overlap)
         new = {estimate.link: estimate for estimate in estimates(description, shapes, masses, unread)[0]}
     for name, shape in of.items():
         if name not in new and shape.unit is not None and document.named("link", name).find("inertial") is None:

@@ -93,7 +93,7 @@ def budget(
         columns = arguments.pairs("--joint", joint, "JOINT=COLUMN") or None
         motion = rd.control.from_samples(robot, plan, time=times, joints=columns, unit=unit, ends=ends)
         bodies = [arguments.payload(text) for text in payload or ()] or None
-        with bar(what="computing the torque"):
+        with bar(description="computing the torque"):
             result = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
     more = _more(result, max_payload, fastest, 1.0 if fraction is None else fraction)
     budgets = [result, more["fastest"].budget] if fastest else [result]
@@ -115,11 +115,11 @@ def _more(result: MotorBudget, max_payload: str | None, fastest: bool, fraction:
     """Return further results of a budget, by key."""
     more: dict[str, Any] = {}
     if max_payload is not None:
-        with bar(what="computing the largest payload"):
+        with bar(description="computing the largest payload"):
             more["max_payload"] = rd.tools.motors.max_payload(
                 result, *arguments.link_and_place("--max-payload", max_payload)
             )
     if fastest:
-        with bar(what="planning the fastest motion"):
+        with bar(description="planning the fastest motion"):
             more["fastest"] = rd.tools.motors.fastest(result, fraction)
     return more

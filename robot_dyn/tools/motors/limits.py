@@ -38,7 +38,7 @@ class Limits:
     continuous: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
 
     def __post_init__(self) -> None:
-        check_coefficients(self, PlanError, resolved=True)
+        check_coefficients(self, PlanError, allow_unresolved=True)
 
     def on(self, dynamics: Any) -> Limits:
         """Return the limits of each joint of an arm, (n,).

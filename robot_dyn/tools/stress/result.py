@@ -16,15 +16,20 @@ from robot_dyn.report import Result
 _TABLES = {  # by title, the findings in a table and their attributes
     "worst configurations": (
         "worst",
-        ("what", "joint", "typical", "random", "searched", "minimal", "unit", "note", "found"),
+        ("quantity", "joint", "typical", "random", "searched", "minimal", "unit", "note", "is_worse_than_random"),
     ),
-    "limits": ("limits", ("of", "what", "joint", "value", "unit", "within", "beyond", "confirmed")),
+    "limits": ("limits", ("kind", "what", "joint", "value", "unit", "within", "beyond", "confirmed")),
     "random runs: errors of q in rad or m": (
         "runs",
         ("what", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
     ),
 }
-_HEADINGS: dict[str, str] = {"within": "at 0.98 of value", "beyond": "at 1.02 of value", "duration_s": "duration [s]"}
+_HEADINGS: dict[str, str] = {
+    "within": "at 0.98 of value",
+    "beyond": "at 1.02 of value",
+    "duration_s": "duration [s]",
+    "is_worse_than_random": "worse than random",
+}
 _NUMBERS = ("typical", "random", "searched", "minimal", "value", "duration [s]", "estimated", "true", "unsure")
 
 
@@ -34,7 +39,7 @@ class WorstCase:
     """The configuration at which a quantity is largest.
 
     Attributes:
-        what: Name of the quantity.
+        quantity: Name of the quantity.
         joint: Name of its joint, or empty.
         unit: Unit of the values; empty for dimensionless ones.
         typical: Median over random states.
@@ -45,7 +50,7 @@ class WorstCase:
         note: Further description.
     """
 
-    what: str
+    quantity: str
     joint: str = ""
     unit: str = ""
     typical: float = nan
@@ -63,8 +68,8 @@ class WorstCase:
         return replace(self, **sizes, state={name: x.tolist() for name, x in state.items()})
 
     @reported
-    def found(self) -> bool:
-        """Return True if the search found a worse state than the random ones."""
+    def is_worse_than_random(self) -> bool:
+        """Return True if the search found a worse state than all random ones."""
         return self.searched > self.random
 
 
@@ -74,7 +79,7 @@ class Limit:
     """The smallest step, gain, speed or payload at which something fails.
 
     Attributes:
-        of: "step", "gain", "speed" or "payload".
+        kind: "step", "gain", "speed" or "payload".
         what: Description of the failure.
         joint: Name of the failing joint, or empty.
         value: The limit; inf without one.
@@ -86,7 +91,7 @@ class Limit:
         setups: Setups of the runs at 0.98 and 1.02 of the limit; empty without runs.
     """
 
-    of: str
+    kind: str
     what: str
     joint: str
     value: float
@@ -175,7 +180,7 @@ class Stress(Result):
         refuted = (limit for limit in self.limits if limit.confirmed is False)
         misleading = (run for run in self.runs if run.misleads)
         return (
-            *(f"{x.of} {x.what}: {x.value:.4g} [{x.unit}] is refuted: {x.within}; {x.beyond}" for x in refuted),
+            *(f"{x.kind} {x.what}: {x.value:.4g} [{x.unit}] is refuted: {x.within}; {x.beyond}" for x in refuted),
             *(f"run, {x.what}: estimated {x.estimated:.1e}, true {x.true:.1e}, without a warning" for x in misleading),
         )
 
@@ -188,10 +193,10 @@ class Stress(Result):
     def sentence(self) -> str:
         """Return the number of failures and the worst case of each kind, in one sentence."""
         parts = []
-        for what in dict.fromkeys(case.what for case in self.worst):
-            top = max((case for case in self.worst if case.what == what), key=lambda case: case.searched)
+        for quantity in dict.fromkeys(case.quantity for case in self.worst):
+            top = max((case for case in self.worst if case.quantity == quantity), key=lambda case: case.searched)
             joint = f" ({top.joint})" if top.joint else ""
-            parts.append(f"{what} up to {f'{top.searched:.3g} {top.unit}'.rstrip()}{joint}")
+            parts.append(f"{quantity} up to {f'{top.searched:.3g} {top.unit}'.rstrip()}{joint}")
         checked = sum(limit.confirmed is not None for limit in self.limits) + len(self.runs)
         failed = len(self.failures)
         if late := len(self.out_of_time):

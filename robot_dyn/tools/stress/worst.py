@@ -162,8 +162,8 @@ def worst_configurations(
 ) -> Iterator[WorstCase]:
     """Yield κ, the fastest motion, and gravity torque of each joint with an effort limit."""
     for case, measure in _measures(robot, gains, work):
-        detail = case.note if case.what == FASTEST else case.joint
-        name, needed_for = f"worst {case.what}{f', {detail}' if detail else ''}", HELD if case.note == BY_PD else ()
+        detail = case.note if case.quantity == FASTEST else case.joint
+        name, needed_for = f"worst {case.quantity}{f', {detail}' if detail else ''}", HELD if case.note == BY_PD else ()
         result = work.do(name, partial(worst, case, states, rng, ("q",), measure), needed_for)
         if result is not None and result.searched > NOTHING:  # otherwise gravity has no torque on the joint
             yield result

@@ -165,9 +165,9 @@ def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None
     if efforts.ndim != 1:
         raise QueryError(f"limits must have shape ({len(known)},), got {efforts.shape}")
     types = tuple(j and j.kind for j in known)
-    return View(run, columns, types, _known(efforts), _known(speeds), width)
+    return View(run, columns, types, _limits_or_inf(efforts), _limits_or_inf(speeds), width)
 
 
-def _known(limits: np.ndarray) -> np.ndarray:
+def _limits_or_inf(limits: np.ndarray) -> np.ndarray:
     """Return the limits, with inf for joints without one: 0, nan and 1e300 or more mean no limit."""
     return np.where((limits > 0) & (limits < 1e300), limits, np.inf)

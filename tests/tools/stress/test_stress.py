@@ -42,7 +42,7 @@ def made(name: str) -> rd.tools.stress.Stress:
 @pytest.mark.parametrize("name", ARMS)
 def test_searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nine_tenths(name: str) -> None:
     found = made(name).worst
-    assert {"κ of M", "fastest motion"} <= {each.what for each in found}
+    assert {"κ of M", "fastest motion"} <= {each.quantity for each in found}
     for each in found:
         assert each.searched >= each.random >= each.typical
         assert each.minimal >= 0.9 * each.searched or each.searched < 0
@@ -73,7 +73,7 @@ def test_condition_of_a_double_pendulum_is_worst_where_it_is_straight() -> None:
     q = np.linspace(-np.pi, np.pi, 721)
     M = robot.M(np.stack([0 * q, q], axis=1))
     r = np.abs(M[:, 0, 1]) / np.sqrt(M[:, 0, 0] * M[:, 1, 1])
-    assert first.what == "κ of M"
+    assert first.quantity == "κ of M"
     assert first.searched == pytest.approx(((1 + r) / (1 - r)).max(), rel=1e-9)
 
 
@@ -93,9 +93,9 @@ def test_largest_payload_of_a_pole_is_that_of_statics() -> None:
 @pytest.mark.parametrize("name", ARMS)
 def test_each_limit_is_confirmed_or_said(name: str) -> None:
     result = made(name)
-    assert {each.of for each in result.limits} == {"step", "gain", "speed", "payload"}
+    assert {each.kind for each in result.limits} == {"step", "gain", "speed", "payload"}
     assert result.failures == () and result.ok
-    of_steps = [each for each in result.limits if each.of == "step"]
+    of_steps = [each for each in result.limits if each.kind == "step"]
     assert {each.what for each in of_steps if each.confirmed} >= {"Euler", "Midpoint", "RK4", "DP8"}
     assert all("iteration of its stages" in each.what for each in of_steps if not each.confirmed)
 
@@ -155,28 +155,30 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
     result, robot = made(name), rd.load(name)
     for each in result.worst:
         state = {key: np.array(x) for key, x in each.state.items()}
-        if each.what == "κ of M":
+        if each.quantity == "κ of M":
             M = robot.M(state["q"])
             d = np.sqrt(np.diagonal(M))
             assert np.linalg.cond(M / np.outer(d, d)) == pytest.approx(each.minimal, rel=1e-9)
-        elif each.what.startswith("gravity"):
+        elif each.quantity.startswith("gravity"):
             i = robot.joint_names.index(each.joint)
             assert abs(robot.N(state["q"])[i]) / robot.effort_limit[i] == pytest.approx(each.minimal, rel=1e-9)
-        elif each.what == FASTEST:  # the advisor's, to two digits, where gravity is balanced
+        elif each.quantity == FASTEST:  # the advisor's, to two digits, where gravity is balanced
             gains = (0.0, 0.0) if each.note != BY_PD else pd_of(result)
             effects = () if each.note == BY_PD else "urdf"
             held = rd.control.PDGravity(robot, rd.control.hold(state["q"]), kp=gains[0], kd=gains[1])
             setup = rd.Setup(rd.Plant(robot, effects), state["q"], controller=held, duration_s=1e-4)
             assert abs(rd.advise(setup).fastest.eigenvalue) == pytest.approx(each.minimal, rel=0.06)
         elif each.note.startswith("Pinocchio"):
-            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).of(each.what.split()[-1], "Pinocchio")
-            rough = 0.1 if "inverse" in each.what else 1e-9  # on the root mean square of 100 states
+            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).of(
+                each.quantity.split()[-1], "Pinocchio"
+            )
+            rough = 0.1 if "inverse" in each.quantity else 1e-9  # on the root mean square of 100 states
             assert -np.log10(2.0**-53) - again.given == pytest.approx(each.minimal, rel=rough)
 
 
 def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
     """Gains of the PD by which steps are judged."""
-    law = next(each.setups[0].controller for each in result.limits if each.of == "step" and each.what == "RK4")
+    law = next(each.setups[0].controller for each in result.limits if each.kind == "step" and each.what == "RK4")
     return law.kp, law.kd
 
 
@@ -184,12 +186,12 @@ def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
 def test_setups_repeat_what_confirmed_a_limit(name: str) -> None:
     """The run within a limit stays where the one beyond it goes, ten times as far or more."""
     confirmed = [each for each in made(name).limits if each.confirmed and len(each.setups) == 2]
-    confirmed = list({each.of: each for each in confirmed}.values())  # of steps one method
-    assert {each.of for each in confirmed} >= {"step", "gain"}
+    confirmed = list({each.kind: each for each in confirmed}.values())  # of steps one method
+    assert {each.kind for each in confirmed} >= {"step", "gain"}
     for each in confirmed:
         within, beyond = (rd.simulate(setup) for setup in each.setups)
         off = [np.nanmax(np.abs(run.q[len(run.t) // 2 :] - each.state["q"])) for run in (within, beyond)]
-        assert beyond.outcome.ending is Ending.DIVERGED or off[1] > (2 if each.of == "payload" else 10) * off[0], each
+        assert beyond.outcome.ending is Ending.DIVERGED or off[1] > (2 if each.kind == "payload" else 10) * off[0], each
 
 
 def test_a_joint_without_inertia_is_named_and_the_rest_is_told() -> None:
@@ -197,8 +199,11 @@ def test_a_joint_without_inertia_is_named_and_the_rest_is_told() -> None:
         robot = rd.load("massless_tip")
     result = rd.tools.stress.stress(robot, samples=100, runs=1, budget_s=FOREVER)
     assert "runs: joint 'pointer_joint' carries no inertia" in result.left_out
-    assert {each.of for each in result.limits} == {"speed", "payload"} and not result.runs
-    assert {each.what for each in result.worst} == {"gravity torque / effort limit", "digits lost in inverse_dynamics"}
+    assert {each.kind for each in result.limits} == {"speed", "payload"} and not result.runs
+    assert {each.quantity for each in result.worst} == {
+        "gravity torque / effort limit",
+        "digits lost in inverse_dynamics",
+    }
 
 
 def test_numbers_beyond_a_float64_are_left_out_by_name() -> None:
@@ -206,7 +211,7 @@ def test_numbers_beyond_a_float64_are_left_out_by_name() -> None:
     text = altered((LIMIT, LIMIT.replace('effort="9"', 'effort="1e-320"')), (AXIS, '<axis xyz="0 1 0"/>'))
     robot, rng, work = rd.Robot.from_text(text), np.random.default_rng(3), Work()
     states = random_states(robot, 100, rng)
-    assert {each.what for each in worst_configurations(robot, states, rng, None, work)} == {"κ of M", FASTEST}
+    assert {each.quantity for each in worst_configurations(robot, states, rng, None, work)} == {"κ of M", FASTEST}
     nowhere = partial(worst, WorstCase("nothing"), states, rng, ("q",), lambda batch: np.full(len(batch["q"]), np.nan))
     assert work.do("nothing", nowhere) is None
     assert [each.partition(": ")[0] for each in work.left_out] == [
@@ -249,11 +254,11 @@ def test_what_there_is_no_time_for_is_named_and_nothing_else_is_missing(looks: i
     if "random states" in late:
         assert result.out_of_time == ("random states", "all at these") and not result.worst
         return
-    found = {each.what.split(",")[0] for each in result.limits if each.of == "step"}
+    found = {each.what.split(",")[0] for each in result.limits if each.kind == "step"}
     for name in FIXED_STEP:
         assert (name in found) != (f"step of {name}" in late or "steps" in result.out_of_time)
     for of in ("gain", "speed", "payload"):
-        assert (of in {each.of for each in result.limits}) != (of in late)
+        assert (of in {each.kind for each in result.limits}) != (of in late)
     assert f"{len(result.out_of_time)} not finished in time" in result.sentence
     assert f"not finished in time: {result.out_of_time[0]}" in result.blocks()
 

@@ -95,12 +95,12 @@ class MotorBudget(Result):
         yield f"{self.resolution}; integrals by two rules differ by a fraction of {self.error:.1g}"
         yield ""
         needs = torque | {"peak": [x.peak for x in joints]} | at_peak
-        needs |= {"break-away": map(_known, starts)} if any(x > 0 for x in starts) else {}
+        needs |= {"break-away": map(_four_digits, starts)} if any(x > 0 for x in starts) else {}
         needs |= {
-            "limit": [_known(x.peak_limit) for x in joints],
+            "limit": [_four_digits(x.peak_limit) for x in joints],
             "headroom": [_percent(x.headroom["peak"], x.peak_limit) for x in joints],
             "rms": [x.rms for x in joints],
-            "continuous": [_known(x.continuous_limit) for x in joints],
+            "continuous": [_four_digits(x.continuous_limit) for x in joints],
             "left of it": [_percent(x.headroom["continuous"], x.continuous_limit) for x in joints],
         }
         yield _table(needs)
@@ -109,7 +109,7 @@ class MotorBudget(Result):
         speed |= {
             "speed": [x.speed for x in joints],
             "at t [s]": [x.speed_at_s for x in joints],
-            "limit": [_known(x.speed_limit) for x in joints],
+            "limit": [_four_digits(x.speed_limit) for x in joints],
             "headroom": [_percent(x.headroom["speed"], x.speed_limit) for x in joints],
             "power [W]": [x.power for x in joints],
             "mean [W]": [x.mean_power for x in joints],
@@ -138,7 +138,7 @@ def case_of(motor_budget: MotorBudget, query: str) -> tuple[Plant, PiecewisePoly
     return motor_budget.case
 
 
-def _known(x: float) -> str:
+def _four_digits(x: float) -> str:
     return number_or_dash(x, 4)
 
 
