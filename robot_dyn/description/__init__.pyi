@@ -19,6 +19,7 @@ from robot_dyn.description.solids import cylinder as cylinder
 from robot_dyn.description.solids import ellipsoid as ellipsoid
 from robot_dyn.description.solids import from_density as from_density
 from robot_dyn.description.solids import sphere as sphere
+from robot_dyn.description.sources.xacro import Expansion as Expansion
 from robot_dyn.description.sources.xacro import expand as expand
 from robot_dyn.description.structure import BEYOND as BEYOND
 from robot_dyn.description.structure import GIMBAL as GIMBAL

@@ -30,7 +30,7 @@ from robot_dyn.tools.doctor.estimate import missing_inertials
 from robot_dyn.tools.doctor.finding import Finding, Severity
 
 if TYPE_CHECKING:
-    from robot_dyn.description.sources.xacro import Expansion
+    from robot_dyn.description import Expansion
 
 _OF_TEXT = (
     spelling.misspelt, literals.decimal_commas, literals.line_breaks, literals.angles_in_degrees,
