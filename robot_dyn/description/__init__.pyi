@@ -10,6 +10,7 @@ from robot_dyn.description.inertia import implausibility as implausibility
 from robot_dyn.description.inertial_parameters import parameter_names as parameter_names
 from robot_dyn.description.inertial_parameters import parameters as parameters
 from robot_dyn.description.inertial_parameters import unit_inertias as unit_inertias
+from robot_dyn.description.markup import declared_first as declared_first
 from robot_dyn.description.markup import parse as parse
 from robot_dyn.description.packages import package_folders as package_folders
 from robot_dyn.description.packages import searched as searched
@@ -18,6 +19,7 @@ from robot_dyn.description.solids import cylinder as cylinder
 from robot_dyn.description.solids import ellipsoid as ellipsoid
 from robot_dyn.description.solids import from_density as from_density
 from robot_dyn.description.solids import sphere as sphere
+from robot_dyn.description.sources.xacro import Expansion as Expansion
 from robot_dyn.description.sources.xacro import expand as expand
 from robot_dyn.description.structure import BEYOND as BEYOND
 from robot_dyn.description.structure import GIMBAL as GIMBAL

@@ -28,7 +28,7 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
     """
     if not text.strip():
         raise DescriptionError(f"{source}: is empty; give a URDF file")
-    text, findings = _declared_first(text)
+    text, findings = declared_first(text)
     root, errors = _fed(text, source, False, comments)
     if root is not None:
         return root, (*findings, *_without_namespace(root))
@@ -60,7 +60,7 @@ def _without_namespace(root: etree._Element) -> tuple[str, ...]:
     )
 
 
-def _declared_first(text: bytes) -> tuple[bytes, tuple[str, ...]]:
+def declared_first(text: bytes) -> tuple[bytes, tuple[str, ...]]:
     """Return the text with its XML declaration at the start and an existing version; line numbers are unchanged."""
     match = _LATE_DECLARATION.match(text)
     if not match:

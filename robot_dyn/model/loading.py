@@ -99,7 +99,7 @@ def load(
 
 def _expanded(path: Path, xacro: Mapping[str, str | float | bool], package_dirs: tuple[Path, ...]) -> Description:
     """Return the description of an expanded xacro file."""
-    text, warnings = expand(path, xacro, package_dirs)
+    text, warnings, _ = expand(path, xacro, package_dirs)
     return check(text, source=str(path), findings=warnings)
 
 

@@ -209,7 +209,7 @@ def test_the_corrected_file_of_the_doctor_is_the_robot_that_is_loaded(tmp_path: 
     path = arm(tmp_path, BOX, ROD)
     masses = {"mass": {"link1": 3.0}, "total_mass": 9.0}
     checkup = rd.tools.doctor.check_urdf(path, **masses)  # pyright: ignore[reportArgumentType]
-    assert checkup.repaired is not None and b"<!-- robot-dyn check-urdf: " in checkup.repaired
+    assert checkup.repaired is not None
     repaired, loaded = rd.Robot.from_text(checkup.repaired), estimated(path, **masses)
     assert repaired.estimated == loaded.estimated
     np.testing.assert_array_equal(repaired.M([0.3, -0.4]), loaded.M([0.3, -0.4]))

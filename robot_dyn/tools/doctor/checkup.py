@@ -6,12 +6,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple, final
-
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 from robot_dyn import Robot
-from robot_dyn.description import Structure, catalog, description, searched, structure_of
+from robot_dyn.description import Structure, catalog, description, parse, searched, structure_of
 from robot_dyn.foundations import UNREPORTED, Answer, Block, DescriptionError, QueryError, reported, truth
 from robot_dyn.shapes import Masses
 from robot_dyn.tools.doctor import (
@@ -31,6 +29,9 @@ from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.estimate import missing_inertials
 from robot_dyn.tools.doctor.finding import Finding, Severity
 
+if TYPE_CHECKING:
+    from robot_dyn.description import Expansion
+
 _OF_TEXT = (
     spelling.misspelt, literals.decimal_commas, literals.line_breaks, literals.angles_in_degrees,
     literals.near_right_angles, proportions.far_origins, axes.missing_axes, limits.limits, names.names, names.leftovers,
@@ -48,8 +49,8 @@ class Checkup(Answer):
         source: Path of the file.
         loads: True if the file can be loaded without repairs; otherwise a finding gives the reason.
         findings: All findings, most severe first.
-        repaired: The file with all repairs, each change in a comment before its element; repairing it again changes
-            nothing. None if the file is not XML, or nothing can be repaired.
+        repaired: The file with all repairs; everything else in it is unchanged, and repairing it again changes nothing.
+            None if the file is not XML, or nothing can be repaired.
         left: Findings in the repaired file, with its lines; `findings` if there is no repaired file.
         gone: Findings that the repaired file no longer has.
         examined: True if masses, inertias and shapes were checked, which requires a file that loads, possibly after
@@ -108,7 +109,7 @@ def check_urdf(
         units: Convert masses, inertias and shapes from suspected wrong units. Invented numbers can look like these.
         inertia_unit: Unit from which repairs convert the moments of all links, for example "kg mm2", if the doctor
             suspects it.
-        xacro: Expand the file by xacro first, as `load` does; findings are those of the expanded text, without lines.
+        xacro: Expand the file by xacro first, as `load` does; findings name its lines and macro calls.
 
     Raises:
         CatalogError: If there is no such file, or an entry of `package_dirs` is not a folder.
@@ -126,8 +127,8 @@ def check_urdf(
     if xacro is not None:
         from robot_dyn.description import expand
 
-        text, warned = expand(path, xacro, package_dirs)
-        return _without_lines(checked(text, str(path), package_dirs, estimates, units, unit), map(_assumed, warned))
+        expansion = expand(path, xacro, package_dirs)
+        return _of_xacro(checked(expansion.text, str(path), package_dirs, estimates, units, unit), expansion)
     try:
         description.refuse_xacro(path)
     except DescriptionError as error:
@@ -215,6 +216,7 @@ def _examined(
         if conversions:
             document = _rewritten(document, conversions)
     loads = refusal is None and not any(finding.kind == "refused" for finding in findings)
+    findings = [x if x.line else replace(x, line=written.line(x.where, x.what)) for x in findings]
     repaired = None if document is written or document.text == text else document.text
     return _Examined(loads, _gravest_first(findings), repaired, robot is not None, estimated)
 
@@ -256,17 +258,28 @@ def _refused(source: str, error: DescriptionError) -> Checkup:
     return Checkup(source, False, findings, None, findings)
 
 
-def _without_lines(checkup: Checkup, more: Iterable[Finding]) -> Checkup:
-    """Return the checkup of an expanded text without lines, because they are not the file's, with xacro's warnings.
+def _of_xacro(checkup: Checkup, expansion: Expansion) -> Checkup:
+    """Return the checkup of an expanded text with the places of the xacro file, and with xacro's warnings.
 
     The warnings concern the xacro file: a check of the repaired file does not repeat them.
     """
-    more = tuple(more)
-    findings = [replace(finding, line=None) for finding in checkup.findings]
-    gone = [replace(finding, line=None) for finding in checkup.gone]
-    findings = _gravest_first((*findings, *more))
+    try:
+        elements = parse(expansion.text, checkup.source)[0].iter("*")
+    except DescriptionError:
+        elements = ()
+    places = dict(zip((element.sourceline for element in elements), expansion.places, strict=False))
+
+    def placed(finding: Finding) -> Finding:
+        where, _, line = finding.where.rpartition("line ")
+        if not line.isdecimal():
+            return replace(finding, line=None, expanded_from=places.get(finding.line, ""))
+        return replace(
+            finding, where=where.removesuffix(" in ") or "file", line=None, expanded_from=places.get(int(line), "")
+        )
+
+    findings = _gravest_first((*map(placed, checkup.findings), *map(_assumed, expansion.warnings)))
     left = findings if checkup.repaired is None else checkup.left
-    return replace(checkup, findings=findings, left=left, gone=tuple(gone))
+    return replace(checkup, findings=findings, left=left, gone=tuple(map(placed, checkup.gone)))
 
 
 def _refusal(text: bytes, source: str) -> DescriptionError | None:
@@ -319,7 +332,7 @@ def _of_mesh(note: str) -> Finding:
 
 
 def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
-    """Return the document with all changes, each in a comment before its element.
+    """Return the document with all changes.
 
     If two findings change the same attribute, only the first is repaired; the next round checks the rest.
     """
@@ -330,20 +343,5 @@ def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
             continue
         changed |= places
         for change in finding.changes:
-            comment = etree.Comment(f" robot-dyn check-urdf: {_plain(f'{change.text}: {finding.what}')} ")
-            comment.tail = _indent(change.element)
             change.apply()
-            change.element.addprevious(comment)
-    return document.mended()
-
-
-def _plain(text: str) -> str:
-    """Return a text that is valid in an XML comment."""
-    return " ".join(text.split()).replace("--", "- -").rstrip("-")
-
-
-def _indent(element: etree._Element) -> str:
-    """Return the whitespace before an element."""
-    before = element.getprevious()
-    text = element.getparent().text if before is None else before.tail
-    return "\n" + (text or "").rpartition("\n")[2] if "\n" in (text or "") else " "
+    return document.mended(changed)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robot_dyn.tools.doctor.checkup import Checkup
     from robot_dyn.tools.doctor.finding import Finding
 
-_URDF = FileKind("a URDF", ".urdf", b"<?xml")
+_URDF = FileKind("a URDF", ".urdf")
 
 
 class RepairError(RobotDynError):
@@ -46,7 +46,7 @@ def check_urdf(
 
     Options:
         files (FILE...): URDF files, or names of robots.
-        fix: Write NAME.fixed.urdf here, with every change in a comment.
+        fix: Write NAME.fixed.urdf here; only the repaired values differ from the file.
         units: With --fix: convert values from suspected wrong units, such as kg mm².
         inertia_unit (UNIT): With --fix: convert the moments of all links from this unit, such as kg·mm2, if suspected.
         all_: Print each finding, not one line for each kind.

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from copy import copy
 from typing import Any, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.description import other_format, parse
+from robot_dyn.description import declared_first, other_format, parse
 from robot_dyn.foundations import DescriptionError
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.tags import Place, decoded, edited, tags
 
 _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
 
@@ -39,6 +40,12 @@ class Document:
     def __init__(self, text: bytes, source: str) -> None:
         self.text, self.source = text, source
         self.root, self.assumed = parse(text, source, comments=True)
+        self._written, self._encoding = decoded(declared_first(text)[0], self.root.getroottree().docinfo.encoding)
+        self._rewritten: Set[Place] = frozenset()
+        self._stated = {
+            element: (tag, element.tag, dict(element.attrib))
+            for element, tag in zip(self.root.iter("*"), tags(self._written), strict=True)
+        }
         if self.root.tag != "robot":
             raise DescriptionError(f"{source}: line {self.root.sourceline}: {other_format(self.root.tag)}")
 
@@ -53,12 +60,21 @@ class Document:
         matches = (element for element in self.root.iterfind(kind) if (element.get("name") or "").strip() == name)
         return next(matches, None)
 
-    def mended(self) -> Document:
-        """Return the document with the text of its current elements, which keep the lines of the file."""
-        text = etree.tostring(self.root.getroottree(), xml_declaration=True, encoding="UTF-8")
+    def mended(self, rewritten: Set[Place]) -> Document:
+        """Return the document with the text of its current elements; all else in the text is as in the file.
+
+        Args:
+            rewritten: Pairs of element and attribute whose value is written even if only its blanks differ.
+        """
         new = copy(self)
-        new.text = text + b"\n" if not text.endswith(b"\n") else text
+        new._rewritten = self._rewritten | rewritten
+        text = edited(self._written, self._stated, self.root, new._rewritten, self._encoding)
+        new.text = text.encode(self._encoding, "surrogateescape")
         return new
+
+    def written(self, element: etree._Element, key: str) -> str:
+        """Return the value of an attribute as the file writes it, with its line breaks and references."""
+        return self._written[slice(*self._stated[element][0].attributes[key][1])]
 
     def line(self, where: str, what: str) -> int | None:
         """Return the line of the link or joint, or of an element in it, to which a refusal refers."""

@@ -87,6 +87,7 @@ class Finding:
         line: Line of the file, or None.
         changes: Changes by `--fix`; empty if the intended value is unclear.
         supposed: True if the changes undo a suspected unit or mistake and need `--units`.
+        expanded_from: Line of a xacro file, and the macro calls that led there, innermost first; "" for a URDF.
     """
 
     severity: Severity
@@ -97,11 +98,13 @@ class Finding:
     line: int | None = None
     changes: tuple[Change, ...] = ()
     supposed: bool = False
+    expanded_from: str = ""
 
     @property
     def place(self) -> str:
         """Link, joint or file, with its line if known."""
-        return f"{self.where} (line {self.line})" if self.line else self.where
+        line = self.expanded_from or (f"line {self.line}" if self.line else "")
+        return f"{self.where} ({line})" if line else self.where
 
     def __str__(self) -> str:
         return f"{self.place}: {self.what}; {self.remedy}"

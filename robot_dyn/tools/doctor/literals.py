@@ -17,8 +17,6 @@ NUMBERS = {
     "mesh": ("scale",),
 }  # fmt: skip
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
-_BREAK = re.compile(rb"<\s*([A-Za-z_]+)((?:[^<>\"']|\"[^\"<]*\"|'[^'<]*')*)>")
-_QUOTED = re.compile(rb"([A-Za-z_]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _TURN = 2 * pi
 _DRAWN = ("box", "cylinder", "sphere", "mesh")
 _ROUNDED = 0.011  # [degrees]: error of an angle converted from radians with four digits
@@ -55,15 +53,8 @@ def line_breaks(document: Document) -> Iterator[Finding]:
 
     XML converts them to blanks, as this library does; urdfdom's reader does not.
     """
-    lines = {}
-    for tag in _BREAK.finditer(document.text):
-        for key, *value in _QUOTED.findall(tag[2]):
-            if re.search(rb"[\r\n\t]", value[0] or value[1]):
-                lines.setdefault((tag[1].decode(), key.decode()), []).append(
-                    document.text.count(b"\n", 0, tag.end()) + 1
-                )
     for element, key, words in numbers(document):
-        if element.sourceline in lines.get((element.tag, key), ()):  # the line at which its start tag ends
+        if re.search(r"[\r\n\t]", document.written(element, key)):
             inertial = element.getparent().tag == "inertial"
             drops = "urdfdom drops the whole <inertial> for that" if inertial else "urdfdom refuses that"
             yield document.finding(

@@ -20,9 +20,9 @@ def names(document: Document) -> Iterator[Finding]:
     for kind, names_of_kind in listed.items():
         for name, count in Counter(x.strip() for x in names_of_kind).items():
             if count > 1:
-                yield Finding(
-                    Severity.ERROR, "name_twice", f"{kind} {name!r}", f"is defined {count} times", "rename all but one"
-                )
+                *_, last = (x for x in document.root.iterfind(kind) if (x.get("name") or "").strip() == name)
+                what, remedy = f"is defined {count} times", "rename all but one, or remove the copies"
+                yield document.finding(Severity.ERROR, "name_twice", last, what, remedy)
     for element in document.elements():
         for key in ("name", "link", "joint"):
             name = element.get(key)
