@@ -240,7 +240,12 @@ def test_masses_that_say_nothing_are_refused(tmp_path: Path, masses: dict[str, o
     path = arm(tmp_path, BOX, ROD + MEASURED)
     with pytest.raises(rd.RobotDynError, match=re.escape(message)):
         estimated(path, **masses)
-    if masses:
+    if masses == {"mass": {"link2": 2.0}}:  # the doctor compares it with the file
+        (compared,) = (
+            x for x in rd.tools.doctor.check_urdf(path, mass={"link2": 2.0}).findings if x.kind == "mass_sheet"
+        )
+        assert "link2" in compared.place
+    elif masses:
         with pytest.raises(rd.RobotDynError, match=re.escape(message)):
             rd.tools.doctor.check_urdf(path, **masses)  # pyright: ignore[reportArgumentType]
 
