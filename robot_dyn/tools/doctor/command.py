@@ -76,7 +76,12 @@ def check_urdf(
     if fix and not as_json:
         for file, checkup in zip(files, checkups, strict=True):
             if file not in written:
-                hint = "; --units also converts suspected wrong units" if checkup.findings and not units else ""
+                suspected = {
+                    "--units": not units and any(x.supposed for x in checkup.findings),
+                    "--inertia-unit": inertia_unit is None and any(x.kind == "inertia_unit" for x in checkup.findings),
+                }
+                options_left = " or ".join(name for name, applies in suspected.items() if applies)
+                hint = f"; {options_left} converts values from a suspected unit" if options_left else ""
                 to_stderr(f"{file}: nothing to repair{hint}")
     remaining = (finding for file, x, _ in checked for finding in (x.left if file in written else x.findings))
     if any(finding.severity is Severity.ERROR for finding in remaining):
