@@ -259,7 +259,13 @@ def test_an_effect_given_by_name_is_left_as_it_was() -> None:
 def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     """The kinds of a scene are the names of the effects listed; those that work have them in the ledger."""
     effects = [example(name) for name in EFFECTS if not issubclass(EFFECTS[name], rd.effects.LineSpringDamper)]
-    assert set(BY_KIND) == {effect.name for effect in effects} | {"gravity", "lock", "payload", "armature"}
+    assert set(BY_KIND) == {effect.name for effect in effects} | {
+        "gravity",
+        "lock",
+        "payload",
+        "armature",
+        "mass_scales",
+    }
     assert len({effect.name for effect in effects}) == len(effects) - 2  # stops and lines have two parts each
     run = rd.simulate(rd.Plant(rd.load("planar_2r"), effects), q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
     assert set(run.power) - {"control", "pick_up"} == {

@@ -179,7 +179,7 @@ def test_thresholds_of_the_actuation_are_for_bounds() -> None:
         def thresholds(self, n):
             return (rd.effects.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True),)
 
-    with pytest.raises(EffectError, match="for bounds"):
+    with pytest.raises(EffectError, match="odd: only bounds"):
         rd.simulate(rd.Plant(ARM, [Odd()]), START)
     with pytest.raises(EffectError, match="set only one of"):
         rd.effects.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True, of_velocity=True)

@@ -97,6 +97,7 @@ def values() -> dict[str, Any]:
         (motion := rd.tools.motors.path(ARM, [Q, Q + 0.5], effort=50.0, velocity=1.0)), motion.plan,
         rd.tools.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
         rd.tools.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),
+        rd.tools.step.Stepper(ARM, 3).reset(Q),
         rd.tools.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}

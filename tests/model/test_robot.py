@@ -386,7 +386,6 @@ def wrongs(x: np.ndarray) -> list[Any]:
         x > 0,
         x.astype(str),
         x.astype(object),
-        {"q": x},
         [[0.1], [0.1, 2]],
     ]
 

@@ -119,7 +119,7 @@ def test_rollouts_take_the_same() -> None:
         ),
         (
             lambda: rd.rollouts(ARM, Q, method=OwnImplicit()),
-            "not by own_implicit: give method='RK4' and its step_s",
+            "own_implicit, .*: give method='RK4' and its step_s",
         ),
         (lambda: rd.rollouts(ARM, Q, estimate_error=True), "estimate_error has no effect, simulate one of the runs"),
         (lambda: rd.simulate(ARM, Q, step_s=2e-3), "step_s has no effect on auto, .* method='RK4'"),

@@ -253,7 +253,7 @@ def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
         (str(file), "--html", str(tmp_path)): "is a folder",
         (str(file), "--html", str(tmp_path / "a.html"), "--frame", "hnd"): "no link 'hnd'",
         (str(file), "--html", "a.html", "--port", "8000"): "not both",
-        (str(file), "--video", "x.gif", "--html", "x.html"): "give --video, --html or --port",
+        (str(file), "--video", "x.gif", "--html", "x.html"): "give only one of --video, --html and --port",
         (str(file), "--video", "x.gif", "--size", "wide"): "--size must be WIDTHxHEIGHT",
         (str(file), "--video", str(tmp_path / "x.mp4"), "--force"): "is not an MP4 video",
     }

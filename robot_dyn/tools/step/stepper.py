@@ -15,7 +15,17 @@ from numpy.typing import ArrayLike
 
 import robot_dyn as rd
 from robot_dyn.codegen import thread_count
-from robot_dyn.foundations import MissingTimeError, QueryError, duration, instance, integer, joint_values, shown
+from robot_dyn.foundations import (
+    MissingTimeError,
+    QueryError,
+    Value,
+    duration,
+    instance,
+    integer,
+    joint_values,
+    read_only,
+    shown,
+)
 from robot_dyn.integrate import Integrator
 from robot_dyn.queries import Dynamics
 from robot_dyn.simulation import Periods, batch_of
@@ -24,7 +34,7 @@ from robot_dyn.tools.step.action import TORQUE, HeldTorque
 
 @final
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Value):
     """The state of n lanes.
 
     Attributes:
@@ -40,6 +50,9 @@ class State:
     v: np.ndarray
     z: np.ndarray
     diverged: np.ndarray
+
+    def __post_init__(self) -> None:
+        read_only(self)
 
 
 @final
