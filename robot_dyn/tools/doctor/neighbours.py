@@ -154,7 +154,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
         density = mass / volume if volume else 0.0
         if alone and min(masses) > _LIGHTER * mass:
             what = f"its body has {mass:.3g} kg, but its neighbours have {min(masses):.3g} kg or more"
-        elif density > _STEEL and mass > _HEAVIER * max(masses):
+        elif density > _STEEL and mass > _HEAVIER * max(masses) > 0:
             what = (
                 f"its body has {mass:.4g} kg, {mass / max(masses):.2g} times its heaviest neighbour, and"
                 f" {density:.4g} kg/m³, more than steel"

@@ -156,3 +156,18 @@ def test_masses_of_a_data_sheet_are_compared_with_the_file(tmp_path: Path) -> No
     assert wrong.repaired is None
     with pytest.raises(QueryError, match="no link 'on'"):
         check_urdf(path, mass={"on": 5.0})
+
+
+def test_a_dense_body_next_to_one_without_mass_is_judged_without_a_ratio(tmp_path: Path) -> None:
+    """A frame between two joints has no mass; the ratio of masses would be infinite."""
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    inertia = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+    joints = "".join(
+        f'<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0.3 0 0"/><axis xyz="0 {y} {1 - y}"/></joint>'
+        for name, parent, child, y in (("a", "base", "frame", 0), ("b", "frame", "dense", 1))
+    )
+    text = f'<robot name="r"><link name="base"/><link name="frame"/><link name="dense">{box}<inertial>'
+    path = tmp_path / "r.urdf"
+    path.write_text(f'{text}<mass value="50"/>{inertia}</inertial></link>{joints}</robot>', encoding="utf-8")
+    assert "mass_neighbours" not in {finding.kind for finding in rd.tools.doctor.check_urdf(path).findings}
