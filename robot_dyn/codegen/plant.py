@@ -28,6 +28,7 @@ from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import MissingTimeError
+from robot_dyn.foundations.names_nearest import NamesNearest
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import PLANT, Dynamics
 from robot_dyn.queries.quantity import Key, title
@@ -36,7 +37,7 @@ _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engi
 
 
 @dataclass(frozen=True)
-class CompiledPlant:
+class CompiledPlant(NamesNearest):
     """A plant as machine code; each quantity is compiled on first use and checked against the interpreted plant.
 
     Attributes:
