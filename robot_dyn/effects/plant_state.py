@@ -32,7 +32,7 @@ class PlantState(Answer, Value):
         robot: Name of the robot.
         gravity: Acceleration of free fall in base axes, in [m/s²].
         gravity_acts: True if gravity exerts a torque on a joint at some position.
-        remarks: Order of q if it is not that of the file, joints without a torque of gravity, angles like degrees.
+        remarks: Order of q if the file has another order, joints without a torque of gravity, angles like degrees.
         joints: Names of the n joints.
         types: Types of the joints, such as "revolute".
         q, v, a, tau: The state, (n,), in SI units.

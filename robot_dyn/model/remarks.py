@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import tau as TURN  # noqa: N812  a full turn, in [rad]
 
 import numpy as np
+
+_TURN = 2 * np.pi
 
 
 def no_torque(gravity: tuple[float, float, float]) -> str:
@@ -24,7 +25,7 @@ def gravity_lines(gravity: tuple[float, float, float], free: tuple[str, ...], n:
 
 
 def order_lines(joints: tuple[str, ...], file_order: tuple[str, ...]) -> Iterator[str]:
-    """Yield the order of q if it is not that of the file."""
+    """Yield the order of q if the file has another order."""
     if joints != file_order:
         yield f"order of q: {', '.join(joints)}; the file has {', '.join(file_order)}: give a state by joint name"
 
@@ -43,7 +44,7 @@ def degree_lines(
     """
     turns = np.array([kind == "revolute" for kind in types])
     degrees = np.deg2rad(q)
-    beyond = turns & ((q < lower) | (q > upper)) & (np.abs(q) > TURN)
+    beyond = turns & ((q < lower) | (q > upper)) & (np.abs(q) > _TURN)
     if beyond.any() and ((degrees >= lower) & (degrees <= upper))[turns].all():
         i = int(beyond.argmax())
         yield (

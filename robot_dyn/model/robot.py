@@ -67,7 +67,7 @@ _F8 = np.dtype(float)
 _STATES = 3  # N is analytic in q: if zero at random states, it is zero everywhere
 # named like an entry point, so that building a model does not import the digit counter
 _CHECK_OF_NEARLY_SINGULAR = "robot_dyn.accuracy.correct_digits:DigitCheck"
-_ROUNDING = 1e-12  # relative to weight × length of the robot
+_ROUNDING = 1e-12  # relative to the weight that a joint carries × length of the robot
 AnswerCheck = Callable[["Robot", str, tuple[ArrayLike, ...], ArrayLike], None]
 
 
@@ -299,11 +299,15 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (_STATES, self.n))
         length = 1.0 + sum(float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements)
         length += max(float(np.linalg.norm(body.lever)) for body in self.model.inertias)
+        carried = np.array([body.mass for body in self.model.inertias])
+        for i in range(self.model.njoints - 1, 0, -1):
+            carried[self.model.parents[i]] += carried[i]
+        weight = g * (np.abs(self.couplings.S).T @ carried[1:])
         try:
             largest = np.abs(self._evaluation.answer("N", (q,), nan=False)).max(axis=0)
         except RobotDynError:  # overflows: far from zero
             return ()
-        free = largest <= _ROUNDING * self.total_mass * g * length
+        free = largest <= _ROUNDING * weight * length
         return tuple(name for name, is_free in zip(self.joint_names, free, strict=True) if is_free)
 
     @cached_property
