@@ -44,6 +44,12 @@ def test_a_file_keeps_the_comparison(uncut: rd.Rollouts, tmp_path: Path) -> None
     assert back.summary.splitlines()[:2] == uncut.summary.splitlines()[:2]
 
 
+def test_some_runs_of_a_batch_do_not_claim_the_count_of_all() -> None:
+    """Runs made one by one are counted over the whole batch, so that a slice has no count."""
+    runs = rd.rollouts(SETUP, STARTS)
+    assert runs.statistics.one_by_one > 2 and runs[:2].statistics.one_by_one == 0
+
+
 def test_runs_without_thresholds_have_nothing_to_compare() -> None:
     free = rd.rollouts(rd.Plant(ARM), STARTS[:3], duration_s=0.1, method="RK4", step_s=1e-3, uncut=True)
     assert free.uncut == () and free.comparison is None

@@ -110,7 +110,8 @@ class Rollouts(RolloutsData):
 
         by_run = {field.name: of(getattr(self, field.name)) for field in fields(self) if field.name not in _SHARED}
         numbers = np.arange(len(self)) if self.numbers is None else self.numbers
-        return replace(self, **by_run, numbers=numbers[runs], saved=None)
+        statistics = replace(self.statistics, one_by_one=0, one_by_one_s=0.0)  # counted over the whole batch
+        return replace(self, **by_run, statistics=statistics, numbers=numbers[runs], saved=None)
 
     @cached_property
     def overview(self) -> Overview:
@@ -206,10 +207,11 @@ class Rollouts(RolloutsData):
         """Yield how many runs were made one by one, and how long that took."""
         ran = self.statistics
         if ran.one_by_one and len(self) > 1:
-            all_so = ran.one_by_one_s == ran.wall_s  # no lock step before them
-            remedy = "" if all_so else ": they may pass a threshold; uncut=True lets steps pass it, in lock step"
-            times = f"{ran.one_by_one_s:.2g} s of {ran.wall_s:.2g} s"
-            yield f"{ran.one_by_one} runs were made one by one, in {times}{remedy}"
+            remedy = ""
+            if ran.one_by_one_s < ran.wall_s:  # the others were in lock step
+                remedy = "; with uncut=True, runs that pass a threshold stay in lock step"
+            count = "1 run was" if ran.one_by_one == 1 else f"{ran.one_by_one} runs were"
+            yield f"{count} made one by one, in {ran.one_by_one_s:.2g} s of {ran.wall_s:.2g} s{remedy}"
 
     def _early(self) -> str:
         """Return how many runs ended early, and why."""

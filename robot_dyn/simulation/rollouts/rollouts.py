@@ -87,7 +87,7 @@ def rollouts(
             have separate values: "model.gravity", ….
         record: Quantities to record at the samples: some of "q", "v", "u", "energy", "work". Only `simulate` records
             states of effects and controllers.
-        uncut: True to take whole steps across thresholds, in lock step: as fast as runs without thresholds, but with
+        uncut: True to take whole steps across thresholds, in lock step: nearly as fast as without thresholds, but with
             the error of a step across one. At most 64 runs, drawn at random, are repeated with steps that end at
             thresholds: see `Rollouts.comparison`.
         numbers: Number of each run, which determines its noise, (B,); by default 0 to B − 1. The bits of a run depend

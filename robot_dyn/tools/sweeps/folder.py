@@ -228,6 +228,7 @@ class Folder:
             raise _DamagedError("is of other runs than its name says")
         if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
             raise _DamagedError("its footer lacks digests of rows and samples")
+        TypeAdapter(OneByOne).validate_python(footer["one_by_one"])
         if not file.schema_arrow.equals(schema(self.names)):
             raise _DamagedError("its columns are not those of the sweep")
         if not names:

@@ -362,9 +362,11 @@ class SweepResult(Answer):
             yield f"uncut: steps pass thresholds; {compared or 'not compared yet, sw.run(sweep, folder) does that'}"
         alone = self.folder.one_by_one()
         if alone.runs:
-            remedy = "; with uncut=True steps pass thresholds, in lock step" if alone.runs_s < alone.all_s else ""
-            times = f"{alone.runs_s:.2g} s of {alone.all_s:.2g} s over all threads"
-            yield f"{alone.runs} runs were made one by one, in {times}{remedy}"
+            remedy = ""
+            if alone.runs_s < alone.all_s:  # the others were in lock step
+                remedy = "; with uncut=True, runs that pass a threshold stay in lock step"
+            count = "1 run was" if alone.runs == 1 else f"{alone.runs} runs were"
+            yield f"{count} made one by one, in {alone.runs_s:.2g} s of {alone.all_s:.2g} s over all threads{remedy}"
         reasons, why = self.folder.columns(("reason", "why")).values()
         for reason, count in list(self.reasons().items())[:_SHOWN]:
             yield f"{count} times {reason}, first: {why[self._failed & (reasons == reason)][0]}"

@@ -60,9 +60,16 @@ class Work:
 
     Attributes:
         sweep: The sweep.
+        cut: True to end steps at thresholds even if the sweep is uncut, for comparison.
     """
 
     sweep: Sweep
+    cut: bool = False
+
+    @property
+    def uncut(self) -> bool:
+        """True if steps pass thresholds."""
+        return self.sweep.uncut and not self.cut
 
     @property
     def record(self) -> tuple[str, ...]:
@@ -87,7 +94,7 @@ class Work:
         sweep, runs = self.sweep, drawn(self.sweep.runs, self.sweep.seed)
         values = [sweep.values(run, run + 1) for run in runs.tolist()]
         by_name = {name: np.concatenate([of[name] for of in values]) for name in values[0]}
-        uncut, cut = (Work(replace(sweep, uncut=how))._rows(runs, by_name) for how in (True, False))
+        uncut, cut = (Work(sweep, cut)._rows(runs, by_name) for cut in (False, True))
         others = int((uncut["outcome"] != cut["outcome"]).sum())
         figures = {name: uncut[name] for name in sweep.figures}
         return Comparison(len(runs), sweep.runs, others, tuple(differences(figures, cut, sweep.units)))
@@ -169,7 +176,7 @@ class Work:
         if batch is None:
             raise SweepError(f"run {i} raised: {reasons[0]}")
         ((_, passed),) = stepping_groups(batch)
-        return run_batch(batch, passed, self.sweep.uncut, 1, MOST_BYTES)[0]
+        return run_batch(batch, passed, self.uncut, 1, MOST_BYTES)[0]
 
     def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
         """Write the results of runs into rows, with figures for runs that finished."""
@@ -202,7 +209,7 @@ class Work:
         def made(places: np.ndarray) -> list[tuple[np.ndarray, Rollouts]]:
             some, results = batch.some(places), []
             for at, passed in stepping_groups(some):
-                result = run_batch(some.some(at), passed, self.sweep.uncut, 1, MOST_BYTES, look)
+                result = run_batch(some.some(at), passed, self.uncut, 1, MOST_BYTES, look)
                 if result.stopped.any():  # Ctrl-C during the runs
                     raise Stopped
                 results.append((some.number_of(at), result))

@@ -141,6 +141,8 @@ BY_HAND: dict[str, Damage] = {
     "digest of a number": footer(rows=3),
     "no digests of samples": footer(samples=None),
     "a list of digests": footer(samples=[]),
+    "no times": footer(one_by_one=None),
+    "times of another kind": footer(one_by_one={"runs": "many", "runs_s": 0.0, "all_s": 1.0}),
     "no reason": cell("reason", None),
     "no outcome": cell("outcome", None),
     "another outcome": cell("outcome", "finishedX"),
