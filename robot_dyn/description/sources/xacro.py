@@ -146,6 +146,9 @@ def _record_places(xacro: Any) -> None:
     """Record where each element is written, and the macro calls in which it is copied; xacro keeps neither."""
     from xml.dom import expatbuilder, minidom
 
+    if not (hasattr(xacro, "filestack") and hasattr(xacro, "handle_macro_call")):
+        return  # another version of xacro: findings then have no places
+
     builder: Any = expatbuilder.ExpatBuilderNS
     start, clone, call = builder.start_element_handler, minidom._clone_node, xacro.handle_macro_call  # pyright: ignore[reportAttributeAccessIssue]
     calls: list[tuple[str, Any]] = []
