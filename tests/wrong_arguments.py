@@ -81,6 +81,7 @@ ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
 OF_EXTRAS = {"to_pandas", "to_xarray", "samples"}  # take none either, and need packages that may be absent
+OF_GYMNASIUM = {"close", "close_extras", "render", "get_wrapper_attr", "has_wrapper_attr", "set_wrapper_attr"}
 
 
 def public() -> Iterator[str]:
@@ -101,7 +102,7 @@ def public() -> Iterator[str]:
             shows = issubclass(thing, Answer) and method in SHOWS
             if method.startswith("_") or not callable(getattr(thing, method)):
                 continue
-            if not (field or for_loops or shows or method in OF_EXTRAS):
+            if not (field or for_loops or shows or method in OF_EXTRAS | OF_GYMNASIUM):
                 yield f"{name}.{method}"
 
 
@@ -134,6 +135,13 @@ def examples(folder: Path) -> dict[str, Example]:
     adaptive = rd.integrate.Adaptive()
     arms = rd.tools.step.Stepper(plant, 2)
     arms.reset(q)
+    task: dict[str, Any] = {
+        "start": lambda rng: (q, v), "reward": lambda state, action, goal: np.ones(len(state.q)), "low": [-9.0, -1.0],
+        "high": 9.0, "time_limit_s": 1.0, "terminated": lambda state, goal: state.q[:, 0] > 9.0,
+        "goal": lambda rng: rng.normal(size=2), "observe": lambda state, goal: state.q,
+    }  # fmt: skip
+    learning = rd.tools.step.VectorEnv(rd.tools.step.Stepper(plant, 2), **task)
+    single = rd.tools.step.Env(rd.tools.step.Stepper(plant, 1), **task)
     system = System(lambda t, y: -y, 1)
     given = {"q": q, "v": v, "a": u, "tau": u}
     made: dict[str, Example] = {
@@ -284,6 +292,12 @@ def examples(folder: Path) -> dict[str, Example]:
         call(arms.reset, q=q, v=v, mask=[True, False]),
         call(arms.step, action=[u, u]),
         call(arms.set_state, state=arms.state, mask=[True, False]),
+        call(rd.tools.step.VectorEnv, stepper=arms, **task),
+        call(learning.reset, seed=3),
+        call(learning.step, actions=[u / 2, u / 2]),
+        call(rd.tools.step.Env, stepper=rd.tools.step.Stepper(plant, 1), **task),
+        call(single.reset, seed=3),
+        call(single.step, action=u / 2),
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),

@@ -32,8 +32,10 @@ NO_VALUES = FOR_AUTHORS | {
     "PrecisionWarning",
     "RobotDynError",
     "SweepError",
+    "Env",
     "Stepper",
-}  # for types, warned of or raised; a stepper has a state
+    "VectorEnv",
+}  # for types, warned of or raised; steppers and environments have a state
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "CompiledDynamics", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate",
     "ExplicitRungeKutta",
