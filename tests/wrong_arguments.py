@@ -45,7 +45,7 @@ RESULTS = {
 FOR_AUTHORS = {
     "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
     "TaskDynamics", "ButcherTableau", "RosenbrockTable", "Surd", "System",
-    "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
+    "RightSide", "FixedStepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
     "GaussLegendre", "Rosenbrock", "MoreauJean",
 }  # fmt: skip
 # What time loops and traces call, with numbers that were checked before, or symbols.
@@ -132,6 +132,8 @@ def examples(folder: Path) -> dict[str, Example]:
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
+    arms = rd.tools.step.Stepper(plant, 2)
+    arms.reset(q)
     system = System(lambda t, y: -y, 1)
     given = {"q": q, "v": v, "a": u, "tau": u}
     made: dict[str, Example] = {
@@ -277,6 +279,11 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
         call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
+        call(rd.tools.step.Stepper, plant=plant, n=2, period_s=0.02, controller=sampled, step_s=2e-3, method="RK4",
+            vary={"kp": [8.0, 9.0]}, uncut=True, ledger=True, threads=1),
+        call(arms.reset, q=q, v=v, mask=[True, False]),
+        call(arms.step, action=[u, u]),
+        call(arms.set_state, state=arms.state, mask=[True, False]),
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),

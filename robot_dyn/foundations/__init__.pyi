@@ -91,6 +91,7 @@ from robot_dyn.foundations.validate import joint_values as joint_values
 from robot_dyn.foundations.validate import number as number
 from robot_dyn.foundations.validate import numbers as numbers
 from robot_dyn.foundations.validate import one_state as one_state
+from robot_dyn.foundations.validate import shaped as shaped
 from robot_dyn.foundations.validate import truth as truth
 from robot_dyn.foundations.values import Value as Value
 from robot_dyn.foundations.values import read_only as read_only

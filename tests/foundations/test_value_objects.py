@@ -32,7 +32,8 @@ NO_VALUES = FOR_AUTHORS | {
     "PrecisionWarning",
     "RobotDynError",
     "SweepError",
-}  # for types, warned of or raised
+    "Stepper",
+}  # for types, warned of or raised; a stepper has a state
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "CompiledDynamics", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate",
     "ExplicitRungeKutta",
