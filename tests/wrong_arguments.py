@@ -37,7 +37,8 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics", "MotorBudget", "Motors",
+    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation", "ExpectedPrecision",
+    "InverseKinematics", "MotorBudget", "Motors",
     "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "Stress", "SweepResult",
     "Trajectory", "WorkPrecision",
 }  # fmt: skip
@@ -76,7 +77,15 @@ LAX |= {name: {key for key, each in declared(kind).items() if each.infinite} for
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.step, rd.tools.stress, rd.tools.sweeps)
+TOOLS = (
+    rd.tools.doctor,
+    rd.tools.identify,
+    rd.tools.motors,
+    rd.tools.proof,
+    rd.tools.step,
+    rd.tools.stress,
+    rd.tools.sweeps,
+)
 ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
@@ -130,6 +139,7 @@ def examples(folder: Path) -> dict[str, Example]:
     table, motors = folder / "samples.csv", folder / "motors.csv"
     motors.write_text("joint,peak [N m]\nslide,50\n")
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
+    excited = rd.tools.identify.excite(robot, 5.0, limits={"velocity": 2.0}, starts=1, compare_longer=False)
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
     system = System(lambda t, y: -y, 1)
@@ -263,6 +273,9 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
+        call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
+            tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),
+        call(excited.save, path=folder / "excitation.csv"),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),
         call(rd.tools.motors.budget, motion=rd.control.quintic(q, v, 1.0), plant=plant, payload=rd.Payload("pole",
