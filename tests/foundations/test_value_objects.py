@@ -33,7 +33,10 @@ NO_VALUES = FOR_AUTHORS | {
     "PrecisionWarning",
     "RobotDynError",
     "SweepError",
-}  # for types, warned of or raised
+    "Env",
+    "Stepper",
+    "VectorEnv",
+}  # for types, warned of or raised; steppers and environments have a state
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "CompiledDynamics", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate",
     "ExplicitRungeKutta",
