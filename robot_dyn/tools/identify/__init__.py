@@ -1,6 +1,6 @@
 """Identification: the parameters of an arm from its motion.
 
-excite               the motion within limits that shows the most about the parameters (Excitation)
+excite               the motion within limits that shows the most about the parameters (Excitation, ExpectedPrecision)
 """
 
 from robot_dyn.foundations import public_names
