@@ -133,7 +133,7 @@ def plant_state(
     remarks = (
         *degree_lines(robot.joint_names, robot.joint_types, q, robot.lower, robot.upper),
         *order_lines(robot.joint_names, robot.file_order),
-        *gravity_lines(robot.edits.gravity, robot.gravity_free, robot.n),
+        *gravity_lines(robot.edits.gravity, robot.gravity_free, robot.balanced, robot.n),
     )
     return PlantState(
         robot.name, robot.edits.gravity, robot.gravity_acts, remarks, robot.joint_names, robot.joint_types,

@@ -84,6 +84,7 @@ from robot_dyn.foundations.validate import JointValues as JointValues
 from robot_dyn.foundations.validate import choice as choice
 from robot_dyn.foundations.validate import duration as duration
 from robot_dyn.foundations.validate import function as function
+from robot_dyn.foundations.validate import in_order as in_order
 from robot_dyn.foundations.validate import instance as instance
 from robot_dyn.foundations.validate import integer as integer
 from robot_dyn.foundations.validate import joint_values as joint_values

@@ -17,6 +17,7 @@ import robot_dyn as rd
 from robot_dyn.codegen import thread_count
 from robot_dyn.control import Controller
 from robot_dyn.foundations import (
+    JointValues,
     MissingTimeError,
     QueryError,
     Value,
@@ -142,6 +143,11 @@ class Stepper:
         return self._labels
 
     @property
+    def has_ledger(self) -> bool:
+        """True if the stepper computes `energy_residual`."""
+        return self._ledger
+
+    @property
     def energy_residual(self) -> np.ndarray:
         """Energy residual K + V − (K + V before) − Σ W of the latest step of each lane, (n,), in [J].
 
@@ -154,11 +160,11 @@ class Stepper:
             raise QueryError("energy_residual: this stepper has no ledger; give ledger=True")
         return self._residual.copy()
 
-    def reset(self, q: ArrayLike, v: ArrayLike | None = None, mask: ArrayLike | None = None) -> State:
+    def reset(self, q: JointValues, v: JointValues | None = None, mask: ArrayLike | None = None) -> State:
         """Start lanes at q and v, at time 0, with the states of the effects at their start.
 
         Args:
-            q: Positions, (joints,) or (n, joints), in [rad] or [m] by joint.
+            q: Positions, (joints,) or (n, joints), in [rad] or [m] by joint; also by joint name, 0 for joints left out.
             v: Velocities, (joints,) or (n, joints), in [rad/s] or [m/s]; 0 by default.
             mask: True for the lanes to start, (n,); all by default. Rows of the other lanes are ignored.
 
@@ -177,7 +183,7 @@ class Stepper:
         self._write(chosen, y, np.zeros(self._n, bool), np.zeros(self._n, np.int64))
         return self.state
 
-    def step(self, action: ArrayLike) -> State:
+    def step(self, action: JointValues) -> State:
         """Advance all lanes by a period under torques or set-points, within the effort limits of the plant.
 
         A lane that diverges is nan from then on, until it is reset. Its action is ignored, and may be nan.
@@ -255,7 +261,7 @@ class Stepper:
             raise QueryError(f"mask must be True or False for each of the {self._n} lanes, got {shown(mask)}")
         return chosen
 
-    def _rows(self, name: str, x: ArrayLike, chosen: np.ndarray) -> np.ndarray:
+    def _rows(self, name: str, x: JointValues, chosen: np.ndarray) -> np.ndarray:
         """Return finite values of the chosen lanes, (k, joints)."""
         n, array = len(self._names), shaped(name, x, self._names)
         if array.shape not in ((n,), (self._n, n)):

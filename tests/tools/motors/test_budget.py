@@ -536,3 +536,54 @@ def test_a_verdict_of_many_lines_stands_above_the_axes_of_its_figure() -> None:
     headings = [*figure.texts, *figure.subfigs[0].texts]
     bottom = min(text.get_window_extent(renderer).y0 for text in headings)
     assert max(axes.get_tightbbox(renderer).y1 for axes in figure.axes) < bottom
+
+
+# --- passive joints
+
+TWO_BARS = rd.load("planar_2r")
+PASSIVE = {"joint_1": 20.0, "joint_2": 0.0}
+
+
+def test_the_budget_of_a_run_with_a_passive_joint_fits() -> None:
+    """The actuation of a joint without a motor is 0, which is no more than its limit of 0."""
+    plant = rd.Plant(TWO_BARS, [rd.effects.EffortLimit(PASSIVE), rd.effects.ViscousFriction(0.2)])
+    controller = rd.control.PD(rd.control.hold([0.4, 0.0]), kp=20.0, kd=5.0)
+    run = rd.simulate(plant, [0.3, 0.0], duration_s=0.4, controller=controller)
+    found = budget(run, effort=PASSIVE, velocity=50.0)
+    _, passive = found.joints
+    assert found.fits and (passive.peak, passive.peak_limit, passive.shares["peak"]) == (0.0, 0.0, 0.0)
+    assert "joint_2" not in found.verdict and found.to_json()
+
+
+def test_a_plan_that_needs_torque_of_a_passive_joint_does_not_fit() -> None:
+    found = budget(rd.control.quintic([0.1, 0.2], [0.3, 0.1], 1.0), TWO_BARS, effort=PASSIVE, velocity=50.0)
+    assert not found.fits and found.joints[1].too_small == ("peak",) and found.joints[1].shares["peak"] == np.inf
+    assert found.to_json() and "joint_2" in str(found)
+    assert max_payload(found, TWO_BARS.frame_names[-1]).mass is None
+
+
+def test_a_passive_joint_that_needs_no_torque_fits() -> None:
+    """A balanced load at rest, without gravity: 0 of 0."""
+    found = budget(rd.control.hold([0.3]), FREE, effort=0.0, velocity=1.0)
+    assert found.fits and found.joints[0].shares["peak"] == 0.0
+
+
+@toppra
+def test_no_path_is_planned_for_a_passive_joint() -> None:
+    with pytest.raises(PlanError, match="effort of joint 'joint_2' is 0"):
+        rd.tools.motors.path(TWO_BARS, [[0.1, 0.2], [0.3, 0.1]], effort=PASSIVE, velocity=3.0)
+
+
+def test_an_effort_limit_of_zero_is_refused_without_motors_and_not_mentioned_with_them(tmp_path: Path) -> None:
+    limit = '<limit effort="0" velocity="9"/><parent link="base"/>'
+    arm = rd.Robot.from_text(TWO_BARS.description.text.decode().replace('<parent link="base"/>', limit, 1))
+    motion = rd.control.quintic([0.1, 0.2], [0.3, 0.1], 1.0)
+    assert arm.findings and not arm.announced_findings
+    with pytest.raises(PlanError, match=r"effort limit 0 for 'joint_1'.*\{'joint_1': 0\} for a passive joint"):
+        budget(motion, arm)
+    (tmp_path / "motors.csv").write_text("joint,peak [N m],speed [rad/s]\njoint_1,200,9\njoint_2,60,9\n")
+    for stated in (
+        {"motors": rd.tools.motors.read_motors(tmp_path / "motors.csv")},
+        {"effort": 200.0, "velocity": 9.0},
+    ):
+        assert not any("effort limit" in finding for finding in budget(motion, arm, **stated).findings)

@@ -21,7 +21,7 @@ import numpy as np
 from robot_dyn import Payload, Plant
 from robot_dyn.description import LARGEST
 from robot_dyn.foundations import Answer, Block, QueryError
-from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.limits import Limits, used_fraction
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
@@ -201,5 +201,6 @@ def _of_means(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
 def _share(demand: Demand, limits: Limits) -> float:
     """Return the largest share of a torque limit."""
     rms = np.sqrt(demand.mean(demand.split.tau**2))
-    broken = np.abs(demand.starts.torque) / limits.effort[demand.starts.joint]
-    return float(max((demand.peak / limits.effort).max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))
+    broken = used_fraction(np.abs(demand.starts.torque), limits.effort[demand.starts.joint])
+    peak = used_fraction(demand.peak, limits.effort)
+    return float(max(peak.max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))

@@ -1,0 +1,8 @@
+"""Identification: the parameters of an arm from its motion.
+
+excite               the motion within limits that shows the most about the parameters (Excitation, ExpectedPrecision)
+"""
+
+from robot_dyn.foundations import public_names
+
+__getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]
