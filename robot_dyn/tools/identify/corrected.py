@@ -22,7 +22,7 @@ def corrected(arm: Robot, links: Links, theta: np.ndarray, friction: np.ndarray,
         links: Its links.
         theta: Their new parameters, (N, 10).
         friction: Viscous and Coulomb friction of the joints, (2, n), not negative.
-        notes: A comment for links and joints, by name.
+        notes: A comment in ASCII for links and joints, by name.
     """
     document = Document(arm.description.text, arm.description.source)
     rewritten: set[tuple[Any, str]] = set()
@@ -61,5 +61,5 @@ def _with_notes(text: bytes, notes: Mapping[str, str]) -> bytes:
     for k in sorted(above, reverse=True):
         indent = lines[k][: len(lines[k]) - len(lines[k].lstrip())]
         if lines[k].lstrip().startswith((b"<link", b"<joint")):
-            lines.insert(k, indent + f"<!-- {above[k].replace('--', '- -')} -->".encode("ascii", "xmlcharrefreplace"))
+            lines.insert(k, indent + f"<!-- {above[k]} -->".encode("ascii"))
     return b"\n".join(lines)

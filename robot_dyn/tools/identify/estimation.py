@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, final
@@ -103,8 +104,10 @@ class Estimate(Value):
     instruments: State
 
 
-def estimate(model: Model, log: Log, signals: Signals, slow: np.ndarray) -> Estimate:
-    """Return the estimate from a log.
+def estimate(
+    model: Model, log: Log, signals: Signals, slow: np.ndarray, check: Callable[..., None] = lambda *_: None
+) -> Estimate:
+    """Return the estimate from a log; `check` is called with the rows, the motion and the torques before the fit.
 
     Rows of a joint slower than `slow`, (n,), and rows within the filter's memory of such rows, are left out.
     """
@@ -127,7 +130,9 @@ def estimate(model: Model, log: Log, signals: Signals, slow: np.ndarray) -> Esti
     for _ in range(_ITERATIONS):
         shifted = np.stack([np.interp(at + delta, times, x) for x in tau.T], axis=1)
         rates = np.stack([np.interp(at + delta, times, x) for x in rate.T], axis=1)
-        predicted = rates if values is None else np.gradient(independent @ values, signals.step_s * signals.every, axis=0)
+        predicted = (
+            rates if values is None else np.gradient(independent @ values, signals.step_s * signals.every, axis=0)
+        )
         rows = Rows(
             names,
             np.concatenate([Y, signals.second(rates)[..., None]], axis=2),
@@ -135,6 +140,8 @@ def estimate(model: Model, log: Log, signals: Signals, slow: np.ndarray) -> Esti
             signals.second(shifted - known),
             used,
         )
+        if values is None:
+            check(rows, *map(signals.second_of, state), signals.second_of(shifted))
         result = fit(rows)
         step = result.values[-1]
         values, delta = result.values[:-1], float(np.clip(delta - step, -_LATEST_S, _LATEST_S))

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn import Robot, Trajectory
+from robot_dyn import Robot, RobotDynError, Trajectory
 from robot_dyn.control import PiecewisePolynomial, name_of, recorded, refuse_other_units, table_of
-from robot_dyn.foundations import RobotDynError, Value, instance, numbers, read_only
+from robot_dyn.foundations import Value, instance, numbers, read_only
 from robot_dyn.tools.identify.signals import evenly
 
 if TYPE_CHECKING:
@@ -57,8 +57,9 @@ class Log(Value):
 def read_log(
     arm: Robot, source: Any, reference: PiecewisePolynomial | None = None, gains: ArrayLike | None = None
 ) -> Log:
-    """Return the log in a source: a table with times, positions "q JOINT", torques "tau JOINT" or currents
-    "current JOINT", and, if known, desired positions "desired JOINT".
+    """Return the log in a source.
+
+    It has times, positions "q JOINT", torques "tau JOINT" or currents "current JOINT", and perhaps "desired JOINT".
 
     Args:
         arm: The arm.
@@ -74,7 +75,9 @@ def read_log(
     table = table_of(_spread(arm, source), arm.joint_names, {}, None, None)
     columns = {name_of(head): head for head in table.columns}
     times = {head: x for head, x in table.columns.items() if name_of(head) in ("t", "time", "timestamp", "stamp")}
-    q_heads = {joint: next((columns[k] for k in (f"q {joint}", joint) if k in columns), None) for joint in arm.joint_names}
+    q_heads = {
+        joint: next((columns[k] for k in (f"q {joint}", joint) if k in columns), None) for joint in arm.joint_names
+    }
     q_columns = {_renamed(head, joint): table.columns[head] for joint, head in q_heads.items() if head is not None}
     samples = recorded(arm, times | q_columns)
     refuse_other_units(samples)
@@ -122,9 +125,7 @@ def _torques(arm: Robot, table: Mapping[str, np.ndarray], columns: Mapping[str, 
     if missing := [joint for joint, head in heads.items() if head is None]:
         if gains is None and all(f"current {joint}" in columns for joint in arm.joint_names):
             raise LogError("the log has currents, not torques; give the drive gains in N m/A as gains=")
-        what = f"column '{kinds[0]} {missing[0]}'"
-        raise LogError(f"there is no {what}; the log needs one for each joint, also {', '.join(missing[1:]) or 'others'}"
-                       if len(missing) > 1 else f"there is no {what}; add it")  # fmt: skip
+        raise LogError(f"there is no column '{kinds[0]} {missing[0]}': the log needs one for each joint; add it")
     tau = np.stack([np.asarray(table[str(head)], float) for head in heads.values()], axis=1)
     if not np.isfinite(tau).all():
         k, i = np.argwhere(~np.isfinite(tau))[0]
@@ -149,8 +150,8 @@ def _refuse(arm: Robot, q: np.ndarray, tau: np.ndarray) -> None:
             longest = max(map(len, "".join("x" if x else " " for x in at).split()), default=0)
             if longest >= _STUCK and at.mean() > _STUCK_PART:
                 raise LogError(
-                    f"the torque of {joint} stays at {level:.4g} for {longest} samples: it is saturated; record a slower"
-                    " motion"
+                    f"the torque of {joint} stays at {level:.4g} for {longest} samples: it is saturated; record a"
+                    " slower motion"
                 )
 
 

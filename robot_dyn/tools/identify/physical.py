@@ -1,9 +1,11 @@
 """Physical parameters of links: nearest to those of the file where the log does not determine them.
 
-    min ‖L (R θ − π)‖² + μ² ‖(θ − θ_file)/s‖²   subject to   P_i(θ) = [[½ tr(I) 1 − I, m c], [(m c)ᵀ, m]] ⪰ 0
+    min ‖L (R θ − π)‖² + Σ_i ‖S_i (P_i(θ) − P_i(θ_file)) S_i‖²/σ²,   S_i = P_i(θ_file)^(−1/2)
+    subject to   P_i(θ) = [[½ tr(I) 1 − I, m c], [(m c)ᵀ, m]] ⪰ 0
 
-P is the pseudo-inertia: a link is possible exactly if it is positive semidefinite.
-[Wensing, Kim, Slotine 2018; Sousa, Cortesão 2014]
+P is the pseudo-inertia: a link is possible exactly if it is positive semidefinite. The distance from the file does not
+depend on axes and units; a mass twice as large, with the same shape, has distance 2.
+[Wensing, Kim, Slotine 2018; Sousa, Cortesão 2014; Lee, Wensing, Park 2020]
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from robot_dyn.description import parameters as parameters_of
 from robot_dyn.foundations import Value, adjoint_inverse, needs, read_only, rotation_rpy
 from robot_dyn.tools.identify.log import LogError
 
-PULL = 0.1  # μ: one standard error of a datum outweighs ten sizes of a link
+SPREAD = 0.5  # σ: distance from the file that counts as much as one standard error of a base parameter
 _MARGIN = 1e-6  # least eigenvalue of P, in units of the link
 _LEAST_M = 0.02  # [m]: least size of a link
 
@@ -110,11 +112,13 @@ def physical(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.nda
     needs("clarabel", extra="identify")
     N, sizes = len(links.names), links.sizes
     L = np.linalg.cholesky(np.linalg.inv(covariance)).T
-    A = R.reshape(len(R), N, 10) @ 1.0 if N == 0 else np.einsum("rbk,bkj->rbj", R.reshape(len(R), N, 10), links.X)
+    A = np.einsum("rbk,bkj->rbj", R.reshape(len(R), N, 10), links.X)
     constant = R @ links.rest.ravel() - values
     x = cp.Variable((N, 10))  # in units of the sizes
     data = L @ (A.reshape(len(R), -1) * sizes.ravel()) @ cp.reshape(x, (10 * N,), order="C") + L @ constant
-    objective = cp.sum_squares(data) + PULL**2 * cp.sum_squares(x - links.theta / sizes)
+    objective = cp.sum_squares(data)
+    for i in range(N):
+        objective += cp.sum_squares(_metric(links.theta[i], sizes[i]) @ (x[i] - links.theta[i] / sizes[i])) / SPREAD**2
     possible = [pseudo_inertia(x[i], cp.bmat) >> _MARGIN * np.eye(4) for i in range(N)]
     problem = cp.Problem(cp.Minimize(objective), possible)
     try:
@@ -124,6 +128,15 @@ def physical(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.nda
     if x.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
         raise LogError(f"no possible bodies fit the log ({problem.status}); check the arm and the units of the torques")
     return np.asarray(x.value) * sizes
+
+
+def _metric(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return the matrix (16, 10) from a change of parameters, in units of the size, to S ΔP S."""
+    least = np.array([size[0], 0, 0, 0, *[0.1 * size[4] if k in (0, 2, 5) else 0.0 for k in range(6)]])
+    values, vectors = np.linalg.eigh(pseudo_inertia(theta))
+    floor = np.linalg.eigvalsh(pseudo_inertia(least)).min()
+    S = (vectors / np.sqrt(np.maximum(values, floor))) @ vectors.T
+    return np.stack([(S @ pseudo_inertia(unit) @ S).ravel() for unit in np.diag(size)], axis=1)
 
 
 def inertial_texts(theta: np.ndarray, stated: StatedLink | None = None) -> dict[str, dict[str, str]]:

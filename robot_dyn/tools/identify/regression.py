@@ -20,6 +20,7 @@ from robot_dyn.foundations import Value
 
 LAGS = 3  # rows, in the autocovariance
 LEVEL = 0.95
+_LEAST = 1e-12  # [N m]: least standard deviation of residuals
 
 
 @final
@@ -100,25 +101,27 @@ def rms(x: np.ndarray, used: np.ndarray) -> np.ndarray:
 
 
 def fit(rows: Rows, passes: int = 3) -> Fit:
-    """Return the estimate; joints are weighted by the variance of their residuals, from a first pass with equal weights
-    relative to their torques."""
+    """Return the estimate; joints are weighted by the variance of their residuals.
+
+    The first pass weights them by the variance of their torques.
+    """
     m, n, p = rows.Y.shape
     used = rows.used.astype(float)[..., None]
     Y, Z, tau = rows.Y * used, rows.Z * used, rows.tau * rows.used
     count = np.maximum(rows.used.sum(axis=0), 1)
-    sigma = np.maximum(rms(rows.tau - rows.tau.mean(axis=0), rows.used), 1e-12)
+    inflation = np.sqrt(count / np.maximum(count - p / n, 1))
     scale = np.sqrt((Y**2).sum(axis=(0, 1)))
     scale = np.where(scale > 0, scale, 1.0)
+    residuals = rows.tau - rows.tau.mean(axis=0)
+    values, scores, A = np.zeros(p), Z, np.eye(p)
     for _ in range(passes):
-        w = 1 / sigma**2
-        ZW = (Z / scale * w[:, None]).reshape(-1, p)
-        A = ZW.T @ (Y / scale).reshape(-1, p)
-        values = np.linalg.solve(A, ZW.T @ tau.ravel()) / scale
+        sigma = np.maximum(rms(residuals, rows.used) * inflation, _LEAST)
+        scores = Z / scale / sigma[:, None] ** 2
+        A = scores.reshape(-1, p).T @ (Y / scale).reshape(-1, p)
+        values = np.linalg.solve(A, scores.reshape(-1, p).T @ tau.ravel()) / scale
         residuals = rows.tau - rows.Y @ values
-        own = np.einsum("tip,tip->i", np.abs(Y) > 0, np.ones((1, n, p))) * 0 + p / n
-        sigma = np.maximum(rms(residuals, rows.used) * np.sqrt(count / np.maximum(count - own, 1)), 1e-12)
     inverse = np.linalg.inv(A)
-    e, scores = residuals * rows.used * np.sqrt(count / np.maximum(count - p / n, 1)), (Z / scale * w[:, None])
+    e = residuals * rows.used * inflation
     S = _parametric(scores, e, rows.used)
     blocks = np.einsum("tip,ti->tp", scores, e)
     B = sum(
@@ -134,7 +137,7 @@ def fit(rows: Rows, passes: int = 3) -> Fit:
 
 def _parametric(scores: np.ndarray, e: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Return Σ Zᵢᵀ S_ij Z_j with the autocovariance of the residuals, tapered over the lags (Bartlett)."""
-    m, n, p = scores.shape
+    m, _, p = scores.shape
     S = np.zeros((p, p))
     for k in range(LAGS + 1):
         a, b = slice(k, m), slice(0, m - k)

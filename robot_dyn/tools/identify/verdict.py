@@ -8,6 +8,7 @@ log and are named together. [Schwarz 1978; Kass, Raftery 1995]
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
@@ -20,13 +21,14 @@ from robot_dyn.queries import of_joint
 from robot_dyn.tools.identify.physical import Links
 
 if TYPE_CHECKING:
-    from robot_dyn.tools.identify.estimation import Estimate, Model, State
+    from robot_dyn.tools.identify.estimation import Estimate, Model
 
     Columns = Callable[..., np.ndarray]
 
 SEEN = 3.0  # rms of the residual of a joint, in units of its noise, from which a difference is seen
 SAME = 6.0  # difference in BIC: "strong" evidence
-_SMALL = 1e-5
+_SMALL = 1e-5  # [rad] or [m]
+_NOTHING = 1e-9  # [N m] per unit
 
 
 @final
@@ -90,9 +92,7 @@ class Verdict(Value):
         return tuple(x for x in self.causes if x.bic - self.causes[0].bic < SAME) if self.seen else ()
 
 
-def verdict_of(
-    model: Model, links: Links, found: Estimate, friction: np.ndarray | None
-) -> Verdict:
+def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray | None) -> Verdict:
     """Return the causes of the difference between the file and a log.
 
     Args:
@@ -111,7 +111,7 @@ def verdict_of(
     if friction is not None:
         own[r : r + 2 * n] = friction.ravel()
     w = (rows.used / noise).reshape(-1)
-    shifted = rows.tau + rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
+    shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
     y = w * (shifted - rows.Y @ own).ravel()
     nuisance = rows.Y[..., r : r + 2 * n].reshape(-1, 2 * n) * w[:, None] if friction is None else np.zeros((len(w), 0))
     count, full = int(rows.used.sum()), float(((found.fit.residuals / noise * rows.used) ** 2).sum())
@@ -123,7 +123,8 @@ def verdict_of(
         C = columns(*state)
         C = C if len(C) == len(rows.tau) else signals.second(C)
         C = C.reshape(len(w), -1) * w[:, None]
-        if not (np.abs(C).max(axis=0) > 0).all():
+        C = C[:, np.abs(C).max(axis=0) > _NOTHING * np.abs(w).max()]
+        if not C.shape[1]:  # for example gravity along the axes of all joints
             continue
         fitted, x, covariance = _fitted(np.column_stack([C, nuisance]), y)
         k, chi2 = C.shape[1], float(((y - fitted) ** 2).sum())
@@ -223,6 +224,9 @@ def _mounting(arm: Robot) -> Columns:
         g = np.array(arm.gravity)
         across = np.linalg.svd(g[None])[2][1:]
         turned = [hat(axis) @ g for axis in across]
-        return np.stack([np.asarray(arm.with_(gravity=d).N(q)) for d in turned], axis=-1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # gravity along the axes of all joints
+            arms = [arm.with_(gravity=g) for g in turned]
+        return np.stack([np.asarray(tilted.N(q)) for tilted in arms], axis=-1)
 
     return columns
