@@ -5,6 +5,7 @@ The period is the duration of a setup. Each call runs the same segments from tim
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from math import inf
 from typing import cast, final
@@ -66,7 +67,7 @@ class Periods:
         table.ticks[-1] = 0  # the next period begins with this tick
         assert code.machine_loop is not None
         self._workers = []
-        for some in np.array_split(np.arange(tiles), min(threads, tiles)):  # each thread has its own work arrays
+        for _ in range(min(threads, tiles)):  # each thread has its own work arrays, and a call for every tile
             stepper = cast(PlainMethod, setup.method).stepper(FLOAT64, equation.size, n, equation.size | 1, LANES)
             lanes = lanes_of(equation, self._y[0], parameters[0], 0, table.parameters[0], numbers[0])
             empty = np.empty((0, 0, LANES))
@@ -76,7 +77,7 @@ class Periods:
             )  # fmt: skip
             config = loop_config(equation, alone=False)._replace(largest=LARGEST)
             position, calls = start_position(inf), []
-            for tile in some:
+            for tile in range(tiles):
                 runs = lanes._replace(
                     y=self._y[tile], run_parameters=self._parameters[tile],
                     alive=self._alive[tile], reason=self._reason[tile],
@@ -118,13 +119,14 @@ class Periods:
         rows = inputs if len(inputs) == len(self._numbers) else inputs[self._numbers]
         self._inputs[...] = rows.reshape(len(self._y), LANES, -1).transpose(0, 2, 1)
         self._y[:, self.work :] = 0.0
-        shared(self._run, len(self._workers), 1, len(self._workers))
+        left = iter(range(len(self._y)))  # a thread takes the next tile; calling next() on it is atomic
+        shared(partial(self._run, left), len(self._workers), 1, len(self._workers))
 
-    def _run(self, first: int, last: int) -> int:
+    def _run(self, tiles: Iterator[int], first: int, last: int) -> int:
         for position, calls in self._workers[first:last]:
-            for call in calls:
+            for tile in tiles:
                 for counter in position[:-1]:
                     counter[0] = 0
                 position.budget[0] = np.iinfo(np.int64).max
-                call()
+                calls[tile]()
         return 0
