@@ -35,6 +35,8 @@ def attached(
     """Return the arm with a gripper; `Robot.attach` documents the arguments and errors."""
     instance("frame", frame, str, "give the name of a link of the arm", error=EditError)
     instance("prefix", prefix, str, "give text that precedes the names of the gripper, such as 'g_'", error=EditError)
+    if not prefix.isprintable():
+        raise EditError(f"prefix must be printable text, got {prefix!r}; for example 'g_'")
     structure = structure_of(gripper, Edits())
     joint = f"{prefix}{structure.root}_attachment"
     _refuse(structure_of(arm, Edits()), structure, frame, prefix, joint)
@@ -56,8 +58,8 @@ def attached(
     return replace(merged, findings=(*arm.findings, *gripper.findings))
 
 
-def attached_edits(arm: Edits, gripper: Edits, links: tuple[str, ...], prefix: str) -> Edits:
-    """Return the edits of both robots; `links` are the gripper's.
+def attached_edits(arm: Edits, gripper: Edits, description: Description, prefix: str) -> Edits:
+    """Return the edits of both robots; the description is the gripper's.
 
     Raises:
         EditError: If the gripper was given another gravity than the arm and the standard one.
@@ -73,6 +75,7 @@ def attached_edits(arm: Edits, gripper: Edits, links: tuple[str, ...], prefix: s
     }
     if (ratio := gripper.mass_scale / arm.mass_scale) != 1.0:
         scales = dict(gripper.mass_scales)
+        links = [link.get("name") for link in description.element.iterfind("link[inertial]")]
         own = tuple((prefix + link, ratio * scales.get(link, 1.0)) for link in links)
         pairs["mass_scales"] = arm.mass_scales + own
     payloads = tuple(replace(payload, frame=prefix + payload.frame) for payload in gripper.payloads)

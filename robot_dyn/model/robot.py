@@ -433,8 +433,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         instance("gripper", gripper, Robot, "give a robot, for example rd.load('gripper.urdf')", error=EditError)
         place = (numbers(name, value, (3,), error=EditError) for name, value in (("xyz", xyz), ("rpy", rpy)))
         description = attached(self.description, gripper.description, frame, prefix, *place)
-        links = tuple(structure_of(gripper.description, gripper.edits).links)
-        edits = attached_edits(self.edits, gripper.edits, links, prefix)
+        edits = attached_edits(self.edits, gripper.edits, gripper.description, prefix)
         return Robot(description, edits, self.answer_check or gripper.answer_check)
 
     def to_urdf(self, path: str | Path) -> Path:
