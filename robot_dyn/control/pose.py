@@ -81,7 +81,7 @@ class InverseKinematics(Answer, Value):
 
     @reported
     def unique(self) -> bool:
-        """Return True if all converged starts gave the same solution."""
+        """True if all converged starts gave the same solution."""
         return len(self.solutions) == 1
 
     def blocks(self) -> Iterator[Block]:

@@ -36,7 +36,7 @@ class PlantState(Answer, Value):
         joints: Names of the n joints.
         types: Types of the joints, such as "revolute".
         q, v, a, tau: The state, (n,), in SI units.
-        M, C: (n, n).
+        M, C: Mass matrix and Coriolis matrix, (n, n).
         N: Gravity minus the torques of effects, (n,), in [N m] or [N].
         effects: Torque of each effect on the joints, (n,), by name.
         held: The joints that dry friction and rigid stops hold; () if tau follows from a.

@@ -143,6 +143,11 @@ class Stepper:
         return self._labels
 
     @property
+    def has_ledger(self) -> bool:
+        """True if the stepper computes `energy_residual`."""
+        return self._ledger
+
+    @property
     def energy_residual(self) -> np.ndarray:
         """Energy residual K + V − (K + V before) − Σ W of the latest step of each lane, (n,), in [J].
 
