@@ -46,7 +46,7 @@ def case(name: str, number: int) -> Case:
     """Return a case: masses within ±30 %, the best conditioned of ten random motions."""
     rng = np.random.default_rng([7, number])
     file = rd.load(name)
-    file = file.with_(lock=LOCK.get(name, {}), armature=ROTORS[name])
+    file = file.with_(lock=LOCK.get(name, {})).with_(armature=ROTORS[name])
     structure = structure_of(file.description, file.edits)
     links = [x for links in structure.bodies.values() for x in links if structure.links[x].mass > 0]
     true = file.with_(mass_scales={link: float(np.exp(rng.uniform(-0.3, 0.3))) for link in links})
