@@ -179,7 +179,7 @@ class Advice(Answer):
 
 @takes_options
 def advise(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     **options: Unpack[Options],
@@ -187,15 +187,15 @@ def advise(
     """Report whether the step and the control period of a setup are short enough, and estimate the error.
 
     Args:
-        what: A setup, or a plant or robot with a start, see `simulate`.
-        q0: Initial position, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        system: A setup, or a plant or robot with a start, see `simulate`.
+        q0: Initial position, (n,), in [rad] or [m] by joint; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         **options: Options of the setup, see `simulate`.
 
     Raises:
         QueryError: If the setup is not allowed, or its motion cannot be linearised at any state of the pilot run.
     """
-    setup = setup_of("advise", what, {**starts(q0, v0), **options})
+    setup = setup_of("advise", system, {**starts(q0, v0), **options})
     advice = advice_about(setup, _pilot_states)
     worthwhile = advice.growth < _MAX_GROWTH and (setup.method.controls_error or setup.steps <= _MAX_STEPS)
     return replace(advice, run=simulate(replace(setup, estimate_error=True))) if worthwhile else advice

@@ -118,7 +118,7 @@ class Cost(Result):
 
 
 def cost(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -133,8 +133,8 @@ def cost(
     so that other programs on the machine matter little.
 
     Args:
-        what: A setup, or a plant or robot with a start.
-        q0: Initial position, (n,), in [rad] or [m]; required unless `what` is a setup.
+        system: A setup, or a plant or robot with a start.
+        q0: Initial position, (n,), in [rad] or [m]; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         controller: Controller, see `Setup`; by default that of the setup, or none.
         budget_s: Time budget, compiling not included, in [s].
@@ -145,7 +145,7 @@ def cost(
         QueryError: If an argument is invalid.
     """
     options = starts(q0, v0) | ({} if controller is None else {"controller": controller})
-    setup = setup_of("cost", what, options)
+    setup = setup_of("cost", system, options)
     integer("repeats", repeats, least=1, most=_MAX_REPEATS)
     budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, task)"))
     pairs, left_out = list[ABComparison](), list[str]()

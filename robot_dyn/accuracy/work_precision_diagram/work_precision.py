@@ -218,7 +218,7 @@ class WorkPrecision(Result):
 
 
 def work_precision(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -236,8 +236,8 @@ def work_precision(
     used; "auto" means both engines.
 
     Args:
-        what: A setup, or a plant or robot with a start.
-        q0: Initial position, (n,), in [rad] or [m]; required unless `what` is a setup.
+        system: A setup, or a plant or robot with a start.
+        q0: Initial position, (n,), in [rad] or [m]; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         duration_s: Duration, in [s]; by default that of the setup, or 1. Chaotic motion is cut earlier.
         controller: Controller, see `Setup`; by default that of the setup, or none.
@@ -252,7 +252,7 @@ def work_precision(
         HorizonError: If the motion has no reference solution.
     """
     options = {"duration_s": duration_s, "controller": controller}
-    setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in options.items() if x is not None})
+    setup = setup_of("work_precision", system, starts(q0, v0) | {k: x for k, x in options.items() if x is not None})
     if methods is None:
         methods = [*_FIRST, *(name for name in METHODS if name not in (*_FIRST, AUTO))]
     instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'RK4']")

@@ -50,7 +50,7 @@ RECORDS = ("q", "v", "u", "energy", "work")
 
 @takes_options
 def rollouts(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -75,8 +75,8 @@ def rollouts(
     if steps may be cut and samples lie within them.
 
     Args:
-        what: A plant, a robot or a setup.
-        q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        system: A plant, a robot or a setup.
+        q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `system` is a setup.
         v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; by default 0, or those of the setup.
         vary: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.parameters` lists the names:
             gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
@@ -113,7 +113,7 @@ def rollouts(
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `max_bytes`.
         TraceError: If a part of the setup cannot be compiled; the message names it.
     """
-    setup = replace(_setup(what, q0, options), estimate_error=False)
+    setup = replace(_setup(system, q0, options), estimate_error=False)
     if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
         setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
     max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1)
@@ -234,20 +234,20 @@ def _compared(batch: Batch, runs: Rollouts, threads: int, max_bytes: int) -> Com
     return Comparison(len(places), len(batch), others, tuple(differences(quantities, repeated, units)))
 
 
-def _setup(what: Setup | Plant | Dynamics, q0: JointValues | None, options: Mapping[str, Any]) -> Setup:
+def _setup(system: Setup | Plant | Dynamics, q0: JointValues | None, options: Mapping[str, Any]) -> Setup:
     """Return the setup of all runs; for a plant or robot, with the first start."""
     start = {}
-    if not isinstance(what, Setup):
-        what = what if isinstance(what, Plant) else Plant(what)
+    if not isinstance(system, Setup):
+        system = system if isinstance(system, Plant) else Plant(system)
         if q0 is not None:
-            q = joint_values("q0", q0, what.dynamics.joint_names)
+            q = joint_values("q0", q0, system.dynamics.joint_names)
             start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
     for name in ("estimate_error", "accuracy"):
-        if name in options or (name == "accuracy" and isinstance(what, Setup) and what.accuracy is not None):
+        if name in options or (name == "accuracy" and isinstance(system, Setup) and system.accuracy is not None):
             without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
             remedy = "leave it out" if name in options else without
             raise QueryError(f"rollouts: {name} has no effect, simulate one of the runs for that; {remedy}")
-    return setup_of("rollouts", what, {**start, **options})
+    return setup_of("rollouts", system, {**start, **options})
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
