@@ -314,7 +314,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.info, robot=robot),
         call(rd.parameters, system=setup),
         call(rd.advise, system=plant, q0=q, v0=v, duration_s=0.01),
-        call(priced.of, what="gravity"),
+        call(priced.comparison, name="gravity"),
         call(rd.accuracy.cost, system=setup, q0=q, v0=v, budget_s=1e-9, repeats=1, on_progress=print_nothing),
         call(measured.digits, error=1e-6),
         call(measured.sentence_of, digits=6),
