@@ -208,7 +208,7 @@ def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: i
             return replace(limit, joint="", within=within, confirmed=holds, setups=(setup,))
         if iterates:
             setup = replace(setup, duration_s=_STEPS * limit.value)
-            limit = replace(limit, what=f"{name}, where the iteration of its stages begins to fail")
+            limit = replace(limit, description=f"{name}, where the iteration of its stages begins to fail")
         setups = tuple(replace(setup, step_s=part * limit.value) for part in (_WITHIN, _BEYOND))
         within, beyond = run_from_near(setups[0], at, budget), run_from_near(setups[1], at, budget, not iterates)
     except RobotDynError as error:

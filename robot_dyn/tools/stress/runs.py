@@ -152,7 +152,7 @@ def shrunk_run(run: JudgedRun, name: str, work: Work) -> JudgedRun:
         nonlocal small
         q0, v0 = np.split(x, 2)
         try:
-            young = judged(replace(run.setup, q0=q0, v0=v0), run.what, budget)
+            young = judged(replace(run.setup, q0=q0, v0=v0), run.description, budget)
         except RobotDynError:
             return False
         small = young if young.misleads else small
