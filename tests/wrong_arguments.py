@@ -223,7 +223,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.certify, robot=robot, q=q, v=v, a=u, tau=u, samples=100, seed=3, repeats=1,
             on_progress=lambda part, what: None),
         call(rd.accuracy.warn_below, robot=robot, digits=12.0),
-        call(certified.of, quantity="M", implementation="Pinocchio"),
+        call(certified.digits_of, quantity="M", implementation="Pinocchio"),
         call(certified.save, path=folder / "digits.csv", theme="dark"),
         call(priced.save, path=folder / "cost.csv", theme="dark"),
         call(measured.save, path=folder / "work.csv", theme="dark"),

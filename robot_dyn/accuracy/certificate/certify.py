@@ -60,7 +60,7 @@ class Condition:
         q: Configuration of the largest κ found.
     """
 
-    given: float | None
+    at_state: float | None
     typical: float
     random: float
     searched: float
@@ -92,7 +92,7 @@ class Certificate(Result):
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.certificate.diagram"
     columns: ClassVar[tuple[str, ...]] = (
-        "quantity", "implementation", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+        "quantity", "implementation", "at_state", "typical", "samples", "random", "searched", "time_s", "repeats",
         "repeatable",
     )  # fmt: skip
     robot: str
@@ -114,10 +114,10 @@ class Certificate(Result):
         )
         yield "dynamics to the largest entry in the units √M_ii of the joints, or its rms at random states if larger;"
         yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
-        has_given = any(count.given is not None for count in self.digits)
+        has_state = any(count.at_state is not None for count in self.digits)
         counts = ("typical", "worst of", "random", "searched", "time")
-        headings = ("quantity", "implementation", *["given"] * has_given, *counts)
-        yield Table(headings, tuple(self._digit_rows(has_given)), right=headings[2:])
+        headings = ("quantity", "implementation", *["at state"] * has_state, *counts)
+        yield Table(headings, tuple(self._digit_rows(has_state)), right=headings[2:])
         condition = self.condition
         loss = f": up to {condition.digits:.1f} digits lost in forward dynamics" if isfinite(condition.digits) else ""
         yield (
@@ -133,7 +133,7 @@ class Certificate(Result):
             )
         yield "times of one query from Python, the least of calls that take turns; at most 20 digits are counted"
 
-    def of(self, quantity: str, implementation: str) -> CountedDigits:
+    def digits_of(self, quantity: str, implementation: str) -> CountedDigits:
         """Return the digits of one quantity by one implementation.
 
         Raises:
@@ -191,14 +191,14 @@ class Certificate(Result):
     def _of(self, quantity: str) -> Iterator[CountedDigits]:
         return (count for count in self.digits if count.quantity == quantity)
 
-    def _digit_rows(self, has_given: bool) -> Iterator[tuple[str, ...]]:
+    def _digit_rows(self, has_state: bool) -> Iterator[tuple[str, ...]]:
         """Return a row for each implementation, and one for the decimals of the file, by quantity."""
         for quantity in self.quantities:
             for count in self._of(quantity):
-                given = ["—" if count.given is None else f"{count.given:.1f}"] * has_given
+                given = ["—" if count.at_state is None else f"{count.at_state:.1f}"] * has_state
                 worst, time = (f"{count.random:.1f}", f"{count.searched:.1f}"), format_duration(count.time_s)
                 yield quantity, count.implementation, *given, f"{count.typical:.1f}", str(count.samples), *worst, time
-            yield quantity, DECIMALS, *[""] * (3 + has_given), f"{self.decimals[quantity]:.1f}", ""
+            yield quantity, DECIMALS, *[""] * (3 + has_state), f"{self.decimals[quantity]:.1f}", ""
 
 
 def certify(
@@ -297,7 +297,7 @@ def _count_and_time(
     report: Callable[[float, str], object],
 ) -> list[CountedDigits]:
     """Return digits and times of one quantity by each implementation; append failures to `left_out`."""
-    counts, calls, state = list[CountedDigits](), {}, digit_count.given or row(digit_count.states, 0)
+    counts, calls, state = list[CountedDigits](), {}, digit_count.state or row(digit_count.states, 0)
     for k, implementation in enumerate(options):
         report(k / len(options), f"{quantity.name}: {implementation.name}")
         try:
@@ -308,7 +308,7 @@ def _count_and_time(
     bits = digit_count.truth(digit_count.robot, quantity, state).bits
     name, most = f"balls, {bits} bits", float(MOST_DIGITS)
     calls[name] = _call(Lagrangian(digit_count.robot, Ball(bits)), quantity, state)
-    given = None if digit_count.given is None else most
+    given = None if digit_count.state is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}
     counts.append(CountedDigits(quantity.name, name, given, most, most, most, 1, state=at))
     report(1.0, f"{quantity.name}: times")

@@ -169,11 +169,11 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
             setup = rd.Setup(rd.Plant(robot, effects), state["q"], controller=held, duration_s=1e-4)
             assert abs(rd.advise(setup).fastest.eigenvalue) == pytest.approx(each.minimal, rel=0.06)
         elif each.note.startswith("Pinocchio"):
-            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).of(
+            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).digits_of(
                 each.quantity.split()[-1], "Pinocchio"
             )
             rough = 0.1 if "inverse" in each.quantity else 1e-9  # on the root mean square of 100 states
-            assert -np.log10(2.0**-53) - again.given == pytest.approx(each.minimal, rel=rough)
+            assert -np.log10(2.0**-53) - again.at_state == pytest.approx(each.minimal, rel=rough)
 
 
 def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
