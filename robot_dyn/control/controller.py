@@ -239,7 +239,7 @@ class Stateless(Controller):
         @dataclass(frozen=True)
         class Damped(rd.control.Stateless):
             arm: rd.Robot
-            damping: float = field(metadata=rd.effects.coefficient("N m s/rad", least=0))
+            damping: float = field(metadata=rd.effects.coefficient("N m s/rad", minimum=0))
             n = property(lambda self: self.arm.n)
 
             def torque(self, t, q, v, z):

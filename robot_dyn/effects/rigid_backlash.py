@@ -51,14 +51,14 @@ class RigidBacklash(GearedMotor, SetValued):
         >>> rd.effects.RigidBacklash(half_gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
     """
 
-    half_gap: CoefficientField = field(metadata=coefficient("rad", symbol="β", least=0))
-    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    half_gap: CoefficientField = field(metadata=coefficient("rad", symbol="β", minimum=0))
+    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", exclusive_minimum=0, fill_value=1.0))
     ratio: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient(symbol="n", above=0, elsewhere=1.0)
+        default=default(None), metadata=coefficient(symbol="n", exclusive_minimum=0, fill_value=1.0)
     )
-    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", least=0))
+    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", minimum=0))
     viscous: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("N m s/rad", symbol="b", least=0)
+        default=default(None), metadata=coefficient("N m s/rad", symbol="b", minimum=0)
     )
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)

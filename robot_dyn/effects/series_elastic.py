@@ -58,18 +58,20 @@ class SeriesElastic(GearedMotor, Dissipative):
         ...     half_gap=0.01)
     """
 
-    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0))
-    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", minimum=0))
+    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", exclusive_minimum=0, fill_value=1.0))
     ratio: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient(symbol="n", above=0, elsewhere=1.0)
+        default=default(None), metadata=coefficient(symbol="n", exclusive_minimum=0, fill_value=1.0)
     )
     damping: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("N m s/rad", symbol="d", least=0)
+        default=default(None), metadata=coefficient("N m s/rad", symbol="d", minimum=0)
     )
     viscous: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("N m s/rad", symbol="b", least=0)
+        default=default(None), metadata=coefficient("N m s/rad", symbol="b", minimum=0)
     )
-    half_gap: OptionalCoefficientField = field(default=default(None), metadata=coefficient("rad", symbol="β", least=0))
+    half_gap: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("rad", symbol="β", minimum=0)
+    )
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
     _side: OptionalCoefficientField = field(

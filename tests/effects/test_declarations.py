@@ -50,7 +50,7 @@ def engine_of(part: Any) -> str:
 class Declared(rd.effects.Dissipative):
     """τ = −c tanh(v): what is written outside of the library, and declared."""
 
-    c: Any = field(metadata=rd.effects.coefficient("N m", symbol="c", least=0))
+    c: Any = field(metadata=rd.effects.coefficient("N m", symbol="c", minimum=0))
 
     def thresholds(self, n=0):
         return ()
@@ -125,7 +125,7 @@ class Remembers(rd.effects.Active):
 
 @dataclass(frozen=True, eq=False)
 class Cached(rd.effects.Active):
-    c: Any = field(default=2.0, metadata=rd.effects.coefficient("N m s/rad", least=0))
+    c: Any = field(default=2.0, metadata=rd.effects.coefficient("N m s/rad", minimum=0))
 
     def thresholds(self, n=0):
         return ()

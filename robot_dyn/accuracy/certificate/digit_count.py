@@ -180,16 +180,18 @@ class DigitCount:
         worst_random = row(states, int(np.nanargmax(sampled)))
         worst, _ = worst_state(states, self._rng, errors, sampled, quantity.arguments, **sizes)
         check()
-        judged = [(self.error_at(implementation, quantity, state), state) for state in (worst_random, row(worst, 0))]
-        largest, state = max(judged, key=lambda pair: pair[0])
-        given = None if self.state is None else digits_of(self.error_at(implementation, quantity, self.state))
+        worst_errors = [
+            (self.error_at(implementation, quantity, state), state) for state in (worst_random, row(worst, 0))
+        ]
+        largest, state = max(worst_errors, key=lambda pair: pair[0])
+        at_state = None if self.state is None else digits_of(self.error_at(implementation, quantity, self.state))
         self._count_file(implementation, quantity, state)
         return CountedDigits(
             quantity=quantity.name,
             implementation=implementation.name,
-            at_state=given,
+            at_state=at_state,
             typical=digits_of(float(np.nanmedian(sampled))),
-            random=digits_of(judged[0][0]),
+            random=digits_of(worst_errors[0][0]),
             searched=digits_of(largest),
             samples=len(sampled),
             state={name: state[name].tolist() for name in quantity.arguments},

@@ -261,7 +261,7 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     shapes = (("B",), ("B", 1), ("B", size)) if limits.of_joints or size == 1 else (("B", *shape),)
     array = numbers(
         f"vary: {name}", values, *shapes,
-        least=limits.least, above=limits.above, infinite=limits.infinite,
+        least=limits.minimum, above=limits.exclusive_minimum, infinite=limits.infinite,
     )  # fmt: skip
     rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), size)))
     for parameter in matches:

@@ -32,10 +32,16 @@ class Limits:
         continuous: Root mean square of τ, in [N m] or [N].
     """
 
-    effort: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
-    velocity: Any = field(default=inf, metadata=coefficient("rad/s", above=0, infinite=True, elsewhere=inf))
-    acceleration: Any = field(default=inf, metadata=coefficient("rad/s^2", above=0, infinite=True, elsewhere=inf))
-    continuous: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
+    effort: Any = field(default=inf, metadata=coefficient("N m", exclusive_minimum=0, infinite=True, fill_value=inf))
+    velocity: Any = field(
+        default=inf, metadata=coefficient("rad/s", exclusive_minimum=0, infinite=True, fill_value=inf)
+    )
+    acceleration: Any = field(
+        default=inf, metadata=coefficient("rad/s^2", exclusive_minimum=0, infinite=True, fill_value=inf)
+    )
+    continuous: Any = field(
+        default=inf, metadata=coefficient("N m", exclusive_minimum=0, infinite=True, fill_value=inf)
+    )
 
     def __post_init__(self) -> None:
         check_coefficients(self, PlanError, allow_unresolved=True)

@@ -188,11 +188,11 @@ class Work:
         runs, at = Runs(result, places), at[places]
         for name, figure in self.sweep.figures.items():
             try:
-                rows[name][at] = figure.of(runs)
+                rows[name][at] = figure.values(runs)
             except Exception:  # in a user's function: find the runs for which it raises
                 for i, place in enumerate(at.tolist()):
                     try:
-                        rows[name][place] = figure.of(runs.only(i))[0]
+                        rows[name][place] = figure.values(runs.only(i))[0]
                     except Exception as error:
                         rows["outcome"][place] = rows["reason"][place] = RAISED
                         rows["why"][place] = f"figure {name}: {because(error)}"
