@@ -279,7 +279,7 @@ def _slopes(rates: _Rates, x: np.ndarray, is_needed: np.ndarray | bool = True) -
     """Return ∂(a, ż)/∂x, (n + size, m), by the needed entries of x; 0 by the others."""
     needed = np.flatnonzero(np.broadcast_to(is_needed, x.shape))
     here, longest = rates(x), rates.longest_steps(x)
-    columns = {j: Column.of(rates, x, j, here, longest[j]) for j in needed.tolist()}
+    columns = {j: Column.from_function(rates, x, j, here, longest[j]) for j in needed.tolist()}
     values = np.zeros((len(here), len(x)))
     rounding = ROUNDING * rates.magnitudes(x, values)
     for _ in range(2):  # the second time with the rounding from the slopes of the first
