@@ -101,7 +101,7 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
     yield from (f"{name} refused: {why}" for name, why in refused.items())
     yield agreed
     if results:
-        name, result = max(results, key=lambda pair: pair[1].worst.share)
+        name, result = max(results, key=lambda pair: pair[1].worst.tolerance_fraction)
         worst = result.worst
         yield f"worst: {name}, {worst.quantity}, {worst.error:.2e} of {worst.tolerance:.1e} allowed, at {worst.entry}"
         if not result.ok:

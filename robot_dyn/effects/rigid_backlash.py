@@ -97,11 +97,11 @@ class RigidBacklash(GearedMotor, SetValued):
 
     def drag(self, n: int, z: Array) -> Array:
         """Return the friction b θ̇ of the motors, (k,)."""
-        return 0 * self.speeds(z) if self.viscous is None else self.of("viscous", n) * self.speeds(z)
+        return 0 * self.speeds(z) if self.viscous is None else self.per_joint("viscous", n) * self.speeds(z)
 
     def _touching(self, n: int) -> Array:
         """Return 1 for driven joints whose motor rests at an end of the gap, else 0, (k,)."""
-        return np.zeros(len(self._driven)) if self._contact is None else self.of("_contact", n) ** 2
+        return np.zeros(len(self._driven)) if self._contact is None else self.per_joint("_contact", n) ** 2
 
     def reaching(self, u: Array) -> Array:
         return self._touching(u.shape[-1]) * u[..., self._driven]

@@ -40,7 +40,7 @@ class Axes(StrEnum):
     WORLD = "world"
 
     @classmethod
-    def of(cls, name: object) -> Axes:
+    def from_name(cls, name: object) -> Axes:
         """Return the axes of that name; raise QueryError for any other."""
         text = name if isinstance(name, str) else str(getattr(name, "name", shown(name)))  # Pinocchio's have names
         return cls(choice("expressed_in", _OF_PINOCCHIO.get(text, text), list(cls)))

@@ -146,7 +146,11 @@ class Call:
         """Return the result of the function for these arguments."""
         before = self._given
         if len(before) != len(arguments):
-            self._given, self._packed, self._kinds = [None] * len(arguments), {}, [Static.of(None)] * len(arguments)
+            self._given, self._packed, self._kinds = (
+                [None] * len(arguments),
+                {},
+                [Static.from_value(None)] * len(arguments),
+            )
             self._block = array("q", bytes(8 * len(arguments)))
             self._take(tuple(range(len(arguments))), arguments)
         else:
@@ -191,5 +195,5 @@ def _read(text: str) -> Kind:
             items = stack.pop()
             stack[-1].append(TupleKind(tuple(items)))
         else:
-            stack[-1].append(_NUMBERS.get(letter, Static.of(None)))
+            stack[-1].append(_NUMBERS.get(letter, Static.from_value(None)))
     return stack[0][0]

@@ -135,7 +135,7 @@ class Function:
             value, values = of_leaves(kind, values[:count]), values[count:]
             self._bind(name, self.fitted(value, self._kinds[name], self.tree))
         if not statements.block(self, self.tree.body):
-            if self.result not in (None, Static.of(None)):
+            if self.result not in (None, Static.from_value(None)):
                 raise self.refused(self.tree, "a function that ends without its result", "end it with a return")
             self.give(StaticValue(None), self.tree)
         self._end_failure()
@@ -292,4 +292,4 @@ def _llvm_result(kind: Kind, may_fail: bool) -> ir.Type:
 
 
 def _or_none(kind: Kind | None) -> Kind:
-    return Static.of(None) if kind is None else kind
+    return Static.from_value(None) if kind is None else kind

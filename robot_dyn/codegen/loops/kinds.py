@@ -111,7 +111,7 @@ class Static:
     token: str
 
     @staticmethod
-    def of(value: object) -> Static:
+    def from_value(value: object) -> Static:
         """Return the type of a value."""
         return Static(value, f"{id(value)}" if callable(value) else repr(value))
 
@@ -150,7 +150,7 @@ def kind_of(value: object) -> Kind:
         if isinstance(value, of):
             return number
     if value is None:
-        return Static.of(value)
+        return Static.from_value(value)
     raise TraceError(
         f"machine code supports numbers, arrays and named tuples of them, got a {type(value).__name__}; convert it"
     )

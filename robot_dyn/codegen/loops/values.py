@@ -113,7 +113,7 @@ class StaticValue:
     @property
     def kind(self) -> Static:
         """Type of the value."""
-        return Static.of(self.value)
+        return Static.from_value(self.value)
 
 
 @final

@@ -178,7 +178,7 @@ def stepping_groups(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
     if passed is None or passed.some.all():
         return [(runs, passed)]
     with_thresholds = runs[passed.some]
-    return [(with_thresholds, passed.of(with_thresholds)), (runs[~passed.some], None)]
+    return [(with_thresholds, passed.for_runs(with_thresholds)), (runs[~passed.some], None)]
 
 
 def run_batch(

@@ -72,7 +72,7 @@ class Folder:
         """Number of chunks."""
         return -(-self.runs // self.chunk)
 
-    def of(self, chunk: int) -> tuple[int, int]:
+    def run_range(self, chunk: int) -> tuple[int, int]:
         """Return the first run of a chunk, and the run after its last."""
         return chunk * self.chunk, min((chunk + 1) * self.chunk, self.runs)
 
@@ -125,7 +125,7 @@ class Folder:
     ) -> None:  # fmt: skip
         """Write a chunk, its samples first; raise a SweepError, with existing files unchanged, if that fails."""
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
-        start, stop = self.of(chunk)
+        start, stop = self.run_range(chunk)
         footer = {
             "sweep": self.digest,
             "chunk": chunk,
@@ -203,7 +203,7 @@ class Folder:
         names = list(dict.fromkeys(names))
         columns = {name: np.empty(self.runs, type_of(name)) for name in names}
         for chunk in range(self.count):
-            start, stop = self.of(chunk)
+            start, stop = self.run_range(chunk)
             for name, x in self._read(chunk, names)[0].items():
                 columns[name][start:stop] = x
         return columns
@@ -220,7 +220,7 @@ class Folder:
                 raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
 
     def _parsed(self, file: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
-        start, stop = self.of(chunk)
+        start, stop = self.run_range(chunk)
         footer = json.loads(file.schema_arrow.metadata[_FOOTER])
         if footer["sweep"] != self.digest:
             raise _DamagedError("is of another sweep")

@@ -402,7 +402,7 @@ class SweepResult(Answer):
         columns = self.folder.columns((*numbers.intersection(expression.names), "outcome"))
         outcome = columns.pop("outcome")
         columns |= {name: outcome == name for name in OUTCOMES} | {"failed": outcome != FINISHED}
-        return expression.of(columns)
+        return expression.evaluate(columns)
 
     def _included(self, known: np.ndarray, condition: str | None) -> np.ndarray:
         """Return True for included runs, (N,): all, finished ones, or finished ones with a known value."""

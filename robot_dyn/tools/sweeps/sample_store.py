@@ -49,7 +49,7 @@ class Samples(Value):
         integer("every", self.every, least=1, most=2**53, error=SweepError)
         truth("failed", self.failed, error=SweepError)
 
-    def of(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
+    def selected(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
         """Return True for runs whose samples are kept, (k,)."""
         return (runs % self.every == 0) & (diverged | (not self.failed))
 

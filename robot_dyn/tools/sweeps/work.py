@@ -123,7 +123,7 @@ class Work:
             ran = result.statistics
             alone += OneByOne(ran.one_by_one, ran.one_by_one_s, ran.wall_s)
             if selection is not None and t is not None:
-                selected = selection.of(runs, result.diverged)
+                selected = selection.selected(runs, result.diverged)
                 _check_times(result.t, t)
                 for name, x in samples.items():
                     x[runs[selected] - start, : len(result.t)] = getattr(result, name)[selected]
