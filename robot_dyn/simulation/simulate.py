@@ -18,7 +18,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
 from robot_dyn.integrate.time_stepping import MoreauJean
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
-from robot_dyn.simulation.diagnostics.runaway import judged, runaway
+from robot_dyn.simulation.diagnostics.runaway import runaway, runaway_outcome
 from robot_dyn.simulation.diagnostics.stiff_motion import replacement
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.engine.choice import choose
@@ -162,7 +162,7 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
             case recording:
                 observer.end()
                 if too_fast := runaway(setup, observer.fastest):
-                    recording = replace(recording, outcome=judged(setup, recording, too_fast))
+                    recording = replace(recording, outcome=runaway_outcome(setup, recording, too_fast))
                 return _Ran(setup, engine, observer, recording, run.seconds, remarks, too_fast)
 
 

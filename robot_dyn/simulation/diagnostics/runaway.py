@@ -73,7 +73,7 @@ def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 
-def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Outcome:
+def runaway_outcome(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Outcome:
     """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:

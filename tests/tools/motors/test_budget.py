@@ -378,7 +378,7 @@ def test_the_least_pace_is_the_first_root_of_the_mean_square_though_neither_1_no
     pace = least_pace(SWING, plant, np.array([limit]))
     assert pace.fits and pace.factor == pytest.approx(1 / largest, rel=1e-6)  # O(h²) of the rule
     none = least_pace(SWING, plant, np.array([0.9 * np.sqrt(least)]))
-    assert not none.fits and none.share == pytest.approx(1 / 0.9, rel=1e-3)  # the best of 201 places of an octave
+    assert not none.fits and none.fraction == pytest.approx(1 / 0.9, rel=1e-3)  # the best of 201 places of an octave
 
 
 def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
