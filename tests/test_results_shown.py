@@ -114,7 +114,9 @@ def test_a_checkup_has_a_row_for_each_finding() -> None:
 
 
 def test_marks_on_a_logarithmic_axis_stand_where_the_logarithm_says() -> None:
-    shares = {each.quantity: each.share for each in made("compare").agreements if each.share > 0}
+    shares = {
+        each.quantity: each.tolerance_fraction for each in made("compare").agreements if each.tolerance_fraction > 0
+    }
     tree = html.fragment_fromstring(made("compare")._repr_html_())
     (levels,) = (each for each in tree.iter("g") if each.get("id") == "levels")
     at = [float(mark.get("x")) for mark in levels.iter("use")]

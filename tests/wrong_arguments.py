@@ -43,7 +43,7 @@ RESULTS = {
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
-    "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
+    "Dynamics", "Effect", "EquationOfMotion", "HeldJoint", "Interval", "Mode", "CartesianReference", "ControlLaw",
     "TaskDynamics", "ButcherTableau", "RosenbrockTable", "Surd", "System",
     "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
     "GaussLegendre", "Rosenbrock", "MoreauJean",

@@ -129,8 +129,8 @@ def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
     joint = motor_budget.joints[pace.joint]
     limit, unit = joint.continuous_limit, of_joint("N m", joint.type)
     return (
-        f"no pace fits: {joint.joint} needs {pace.fraction * limit:.4g} of {limit:.4g} {unit} rms at the best pace, with"
-        f" {pace.factor:.4g} times the duration"
+        f"no pace fits: {joint.joint} needs {pace.fraction * limit:.4g} of {limit:.4g} {unit} rms at the best pace,"
+        f" with {pace.factor:.4g} times the duration"
     )
 
 
