@@ -22,7 +22,7 @@ def scene(what: str, given: Mapping[str, object]) -> Setup | None:
     if not what.lower().endswith(".toml"):
         return None
     if of_robots := [name for name, value in given.items() if value]:
-        raise QueryError(f"{of_robots[0]}: is for a robot; a scene states its own, so leave it out")
+        raise QueryError(f"{of_robots[0]}: applies to a robot; a scene defines its own, so remove it")
     return rd.read_scene(what)
 
 
@@ -33,7 +33,7 @@ def run(path: str) -> Trajectory:
     result = rd.read(path)
     if isinstance(result, rd.Rollouts):
         raise QueryError(
-            f"{path}: is a batch of {len(result)} runs, and one run is needed; save one of them in Python, for example"
+            f"{path}: contains {len(result)} runs, but a single run is needed; save one in Python, for example"
             f" rd.read({path!r})[0].save('run.npz')"
         )
     return result

@@ -146,7 +146,7 @@ class Results:
         from robot_dyn.view.plots.pictures import PICTURES
 
         if self.dark and not self.output:
-            raise QueryError("--dark is of the figure; add --output PLOT.png, or leave it out")
+            raise QueryError("--dark applies to a figure: add --output PLOT.png, or remove --dark")
         read, paths = [path for path in inputs if path and os.path.isfile(path)], []
         for path, kinds in ((self.output, PICTURES), (self.csv, table_kind(of))):
             if path:

@@ -132,7 +132,7 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
         quantity = QUANTITIES[choice("quantity", name, QUANTITIES)]
         frames = [frame] if quantity.framed and frame else []
         if quantity.framed and not frames:
-            raise QueryError(f"{name} is a quantity of a frame: give --frame LINK")
+            raise QueryError(f"{name} refers to a frame: add --frame LINK")
         answers[name] = quantity.ask(state.plant.dynamics, vars(state), *frames)
     return answers
 

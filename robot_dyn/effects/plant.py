@@ -52,7 +52,9 @@ class Plant(NamesNearest, Caching):
         object.__setattr__(self, "dynamics", dynamics)
         if isinstance(effects, str):
             if effects != "urdf":
-                raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for the friction in the file")
+                raise EffectError(
+                    f"effects must be a list of effects, or 'urdf' for the friction in the file, got {shown(effects)}"
+                )
             effects = stated_friction(dynamics)
         if (sequence := several(effects)) is None:
             raise EffectError(
@@ -184,7 +186,7 @@ class Plant(NamesNearest, Caching):
         """
         q, v, u = self._states(q=q, v=v, u=u)
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
-            raise QueryError(f"held takes one state: q, v and u must have shape ({self.dynamics.n},)")
+            raise QueryError(f"held_joints takes one state: q, v and u must have shape ({self.dynamics.n},)")
         equation = self.at(t).equation_of_motion
         return held_joints(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t))
 

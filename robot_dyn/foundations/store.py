@@ -144,7 +144,7 @@ class StoredFormat(Generic[Stored]):
         from pydantic import ConfigDict, TypeAdapter
 
         config = ConfigDict(strict=True, extra="forbid")
-        return TypeAdapter(list[self.of], config=config)  # pyright: ignore[reportInvalidTypeForm]
+        return TypeAdapter(list[self.value_type], config=config)  # pyright: ignore[reportInvalidTypeForm]
 
     def save(self, value: Stored, path: str | Path) -> Path:
         """Write a value, completely or not at all, after the checks of a reader.

@@ -266,7 +266,7 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
         return cholesky_solve(M, tau)
     except NotPositiveDefiniteError as error:
         if M.dtype.kind == "f" and not np.isfinite(M).all():
-            raise OverflowedError("q is so large that M overflows; take a smaller q") from None
+            raise OverflowedError("q is so large that M overflows; use a smaller q") from None
         joint = joint_names[error.row]
         if error.decided:
             raise SingularError(joint, "at this q") from None

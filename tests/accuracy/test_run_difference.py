@@ -226,7 +226,7 @@ def test_runs_that_have_nothing_in_common_are_refused() -> None:
     run = coasting(FREE)
     other = rd.simulate(rd.load("planar_2r"), q0=[0.1, 0.2], duration_s=0.1)
     for a, b in ((run, other), (other, run)):
-        with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; give two of one robot"):
+        with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; compare runs of one robot"):
             rd.diff_runs(a, b)
     named = replace(run, metadata=run.metadata | {"robot": "another"})
     with pytest.raises(QueryError, match="different robots, pendulum and another"):

@@ -212,7 +212,7 @@ def test_a_missing_scene_is_told(tmp_path) -> None:
 
 
 def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:
-    with pytest.raises(SceneError, match="line 3: x: is not a key here"):
+    with pytest.raises(SceneError, match="line 3: x: unknown key"):
         parse_scene('robot = "none"\nduration_s = 1.0\nx = 1', "here")
 
 

@@ -31,7 +31,7 @@ def test_a_damper_is_named_with_its_joint(b: list[float], joint: str) -> None:
     expected = np.linalg.eigvals(-np.linalg.solve(ARM.M(STATE[:2]), np.diag(b)))
     assert made.eigenvalue == pytest.approx(expected.real.min(), rel=1e-4)
     assert (made.joint, made.source) == (joint, "viscous_friction")
-    assert str(made).startswith("the fastest motion, of joint ") and "decays at" in str(made)
+    assert str(made).startswith("the fastest motion, at joint ") and "decays at" in str(made)
 
 
 def test_springs_control_and_narrow_friction_are_told_apart() -> None:
@@ -64,7 +64,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     (remark,) = (each for each in stiff.remarks if each.kind is RemarkKind.STIFF)
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
-    assert "steps bounded by stability: the fastest motion, of joint " in stiff.summary
+    assert "steps bounded by stability: the fastest motion, at joint " in stiff.summary
     assert "because of 'viscous_friction'; use method='Rodas5P'" in stiff.summary
     short = rd.simulate(ARM, **options | {"duration_s": 20.0, "method": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     assert short.statistics.steps > 1000

@@ -105,7 +105,7 @@ class QueryCost:
 
     def _right_angles(self) -> tuple[Version, Version]:
         if not completed(self.robot)[1]:
-            raise QueryError("the file states none with too few digits")
+            raise QueryError("the file states all of them to full precision")
         stated = program_of(Trace(self.robot).quantity(_FORWARD).function)
         return self._version("as stated", stated), self._version("exact", self._best[1])
 

@@ -31,9 +31,9 @@ def work_precision(
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
-    """Show what each digit of a motion costs in time.
+    """Measure computing time against accuracy, by method and program.
 
-    Results are listed by method and program. Ctrl-C ends it and keeps its runs.
+    The table lists the time for a number of correct digits. Ctrl-C ends the measurement and keeps finished runs.
 
     Options:
         what (SCENE.toml|ROBOT): A scene file, or a robot for a free swing.
@@ -54,9 +54,9 @@ def work_precision(
 
 @command(DYNAMICS)
 def cost(scene: Scene, /, budget: Budget = 10.0, repeats: Repeats = 25, results: Results = PRINTED) -> None:
-    """Count and time what effects, control and terms cost.
+    """Count instructions and time of effects, control and terms.
 
-    Each is switched on and off; algorithms are compared with each other.
+    Each part of a time step is switched on and off, and alternative algorithms are compared.
     """
     paths = results.files(rd.accuracy.Cost, scene)
     setup = rd.read_scene(scene)

@@ -80,7 +80,7 @@ def query(
     from robot_dyn.foundations.result import plain
 
     if a is not None and tau is not None:
-        raise QueryError("give --a or --tau, not both: one follows from the other")
+        raise QueryError("give --a or --tau, not both: each determines the other")
     setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.stated)
     if setup is None:
         robot = options.load(what)

@@ -100,7 +100,7 @@ class MachineFunction:
         began, types = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
             if types not in self._entries:
-                with log_if_slow(f"compiling {self.about}, once for this version"):
+                with log_if_slow(f"compiling {self.about} (cached for this version)"):
                     self._entries[types] = self._compiled(types)
             self._entries[place] = self._entries[types]
         COMPILING.seconds += perf_counter() - began

@@ -10,13 +10,14 @@ from math import log
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.sentences import stated
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
 from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, line_parts
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.run.recording import Recording
@@ -85,7 +86,8 @@ def runaway_outcome(setup: Setup, record: Recording, fast: dict[str, float | str
     if outcome.ending is not Ending.FINISHED or setup.method.controls_error:
         return outcome
     if remarks := step_too_long(setup, outcome.t):
-        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, dict(remarks[0].fields))
+        facts = stated(line_parts(remarks[0].kind), remarks[0].fields)
+        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, facts)
     with np.errstate(all="ignore"):
         if ledger(setup.equation, record).closes:
             return outcome

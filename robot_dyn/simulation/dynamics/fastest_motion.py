@@ -20,7 +20,7 @@ from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
-_FASTEST = "the fastest motion, of joint {moving_joint!r}, {motion} at {rate_per_s:.3g} per second because of "
+_FASTEST = "the fastest motion, at joint {moving_joint!r}, {motion} at a rate of {rate_per_s:.3g} 1/s due to "
 MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "no force depends on the motion of {moving_joint!r}"
 """The sentence about the fastest motion, from `Fastest.facts`."""
 

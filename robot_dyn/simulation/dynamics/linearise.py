@@ -219,7 +219,7 @@ def _sliding(plant: Plant, q: np.ndarray, v: np.ndarray) -> Plant:
         if effect in plant.equation_of_motion.drives.values():
             raise QueryError(
                 f"linearise: {effect.name} switches at each contact of its gear, so that no linear model describes it;"
-                " take a SeriesElastic with the same motors"
+                " use a SeriesElastic with the same motors"
             )
         interval = effect.at_rest(q)
         acts = np.less(interval.least, 0) | np.greater(interval.most, 0)
@@ -231,7 +231,7 @@ def _sliding(plant: Plant, q: np.ndarray, v: np.ndarray) -> Plant:
         if joints:
             raise QueryError(
                 f"linearise: {effect.name} holds {joints} at rest, where the acceleration has no derivative by v; give"
-                " a velocity other than 0 there, or take RegularisedCoulombFriction instead"
+                " a velocity other than 0 there, or use RegularisedCoulombFriction instead"
             )
     return in_mode(plant, Mode(np.zeros(len(v)), np.sign(v))) if effects else plant
 

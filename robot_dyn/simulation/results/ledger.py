@@ -126,5 +126,5 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
         return ""
     doubt = "do not trust the estimate, " if ledger.cause is None or ledger.cause.is_of_steps else ""
     return (
-        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'take a smaller step'}"
+        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'use a smaller step'}"
     )

@@ -54,7 +54,8 @@ class Parameters(Answer):
     parameters: tuple[SetupParameter, ...]
 
     def blocks(self) -> Iterator[Block]:
-        yield "parameters that rd.rollouts(setup, vary={name: values}) can vary over B runs:"
+        yield "initial states: q0= and v0= of rd.rollouts, each (B, n); --vary 'q0=…' and 'v0=…' of a sweep"
+        yield "parameters that rd.rollouts(setup, vary={name: values}) and --vary of a sweep can vary over B runs:"
         rows = ((x.name, _shown(x.value), x.unit, x.shape) for x in self.parameters)
         yield Table(("name", "value", "unit", "values"), tuple(rows))
 

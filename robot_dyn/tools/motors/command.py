@@ -83,7 +83,7 @@ def budget(
     }  # fmt: skip
     if what.lower().endswith(_RUNS):
         if unused := [name for name, value in of_robots.items() if value]:
-            raise QueryError(f"{unused[0]} is for a robot with a plan; a scene or a run has its own, so remove it")
+            raise QueryError(f"{unused[0]} applies to a robot with a plan; a scene or a run has its own, so remove it")
         result = rd.tools.motors.budget(_run(what), motors=motors)
     else:
         if plan is None:

@@ -163,10 +163,12 @@ class Stepper:
             QueryError: If u has another shape or is not finite, or a lane was never reset.
         """
         if not self._started.all():
-            raise QueryError(f"step: lane {int(np.argmin(self._started))} has no state yet; reset it, or all, first")
+            raise QueryError(f"step: lane {int(np.argmin(self._started))} has not been reset; call reset first")
         torques = np.asarray(u, float) if isinstance(u, np.ndarray) else joint_values("u", u, self._names)
         if torques.shape != (self._n, len(self._names)):
-            raise QueryError(f"u must have shape ({self._n}, {len(self._names)}), one row by lane; got {torques.shape}")
+            raise QueryError(
+                f"u must have shape ({self._n}, {len(self._names)}), one row per lane; got {torques.shape}"
+            )
         if not np.isfinite(torques).all():
             torques = np.where(self._lanes.ended[:, None], 0.0, torques)
             if len(wrong := np.argwhere(~np.isfinite(torques))):

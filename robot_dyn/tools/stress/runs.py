@@ -133,9 +133,9 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     sure = replace(setup, step_s=None, estimate_error=False, method=_BETTER[0])
     better = [simulate(replace(sure, method=integrator), on_progress=budget.check) for integrator in _BETTER]
     if any(x.outcome.ending is not Ending.FINISHED for x in better):
-        raise RobotDynError("a better run did not finish")
+        raise RobotDynError("a more accurate run did not finish")
     if any(x.t.shape != run.t.shape or np.abs(x.t - run.t).max() > _ONE_TIME for x in better):
-        raise RobotDynError("the better runs have other samples")
+        raise RobotDynError("the more accurate runs have other sample times")
     covered, estimate = run.t <= error.until_s, error.at(error.until_s)
     true, unsure = (float(np.abs(q - better[0].q)[covered].max()) for q in (run.q, better[1].q))
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure

@@ -378,7 +378,7 @@ class SweepResult(Answer):
         if len(missing := self.missing):
             raise SweepError(
                 f"{self.path}: {len(missing)} of {self.folder.count} chunks are missing, the first is {missing[0]};"
-                " run the sweep again, which only makes missing chunks"
+                " run the sweep again to compute them"
             )
 
     def _figure(self, name: str) -> np.ndarray:

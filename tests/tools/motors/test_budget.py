@@ -444,7 +444,7 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
     heavy = ran("budget", "ur5", plan, "--payload", "wrist_3_link=5kg@0.12,0.03,0.05", "--limits", motors)
     assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
     assert refusal(["budget", "ur5"]).startswith("ur5: give a motion as well")
-    assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
+    assert "applies to a robot with a plan" in refusal(["budget", "s.toml", plan])
     assert "--fraction is for the fastest motion: add --fastest" in refusal(
         ["budget", "ur5", plan, "--fraction", "0.9"]
     )

@@ -378,7 +378,7 @@ def test_a_run_is_confirmed_to_the_digits_that_it_has() -> None:
     with pytest.raises(QueryError, match="finite"):
         replace(run, q=bad).proven_digits(made)
     elsewhere = rd.simulate(replace(setup, q0=q + 1e-12))
-    with pytest.raises(QueryError, match="starts elsewhere"):
+    with pytest.raises(QueryError, match="starts from another state"):
         elsewhere.proven_digits(made)
     with pytest.raises(QueryError, match="of the joints"):
         rd.simulate(rd.load("pendulum"), q0=[0.1], duration_s=0.01).proven_digits(made)

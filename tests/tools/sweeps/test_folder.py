@@ -163,7 +163,7 @@ def test_another_scene_version_or_chunk_is_refused_by_name(begun_100: Path, file
 def test_a_folder_of_other_files_is_refused(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
-    with pytest.raises(SweepError, match=r"holds other files, such as thesis\.tex"):
+    with pytest.raises(SweepError, match=r"contains other files, such as thesis\.tex"):
         sw.run(swept(tmp_path, 50), tmp_path / "full")
 
 
