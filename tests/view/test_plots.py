@@ -258,7 +258,7 @@ def test_the_suffix_says_the_format(cart, tmp_path, suffix: str, opening: bytes)
 
 
 def test_targets_that_cannot_be_written_are_refused(cart, tmp_path) -> None:
-    with pytest.raises(PlotError, match=r"'.jpeg' is not the suffix of a plot; .*\.png, \.svg, \.pdf"):
+    with pytest.raises(PlotError, match=r"'.jpeg' is not a suffix for a plot; .*\.png, \.svg, \.pdf"):
         plot(cart).save(tmp_path / "plot.jpeg")
     with pytest.raises(PlotError, match="is a folder"):
         plot(cart).save(tmp_path)

@@ -115,7 +115,7 @@ class Certificate(Result):
         yield "dynamics to the largest entry in the units √M_ii of the joints, or its rms at random states if larger;"
         yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
         has_state = any(count.at_state is not None for count in self.digits)
-        counts = ("typical", "worst of", "random", "searched", "time")
+        counts = ("typical", "samples", "random", "searched", "time")
         headings = ("quantity", "implementation", *["at state"] * has_state, *counts)
         yield Table(headings, tuple(self._digit_rows(has_state)), right=headings[2:])
         condition = self.condition

@@ -122,7 +122,7 @@ class MachineFunction:
         key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
         call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
         if store is not None and store.load(note) is None:
-            store.save(note, b"", f"{self.about} is stored")
+            store.save(note, b"", f"{self.about}, marker")
         text = ctypes.CFUNCTYPE(ctypes.c_char_p)(result)().decode()
         return _ENTRY(call), _read(text)
 

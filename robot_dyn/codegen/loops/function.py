@@ -172,9 +172,9 @@ class Function:
             return x
         if isinstance(x, Number) and isinstance(y, Number):
             kind = joined(x, y)
-        elif isinstance(x, ArrayKind) and isinstance(y, ArrayKind) and (x.of, x.ndim) == (y.of, y.ndim):
+        elif isinstance(x, ArrayKind) and isinstance(y, ArrayKind) and (x.number, x.ndim) == (y.number, y.ndim):
             both = x.contiguous and y.contiguous, x.single and y.single, x.frozen or y.frozen
-            kind = ArrayKind(x.of, x.ndim, *both)
+            kind = ArrayKind(x.number, x.ndim, *both)
         elif isinstance(x, TupleKind) and isinstance(y, TupleKind) and len(x.items) == len(y.items):
             pairs = zip(x.items, y.items, strict=True)
             kind = TupleKind(tuple(self.common(a, b, node) for a, b in pairs))

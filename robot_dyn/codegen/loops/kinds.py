@@ -46,14 +46,14 @@ class ArrayKind:
     """An array.
 
     Attributes:
-        of: Type of its numbers.
+        number: Type of its numbers.
         ndim: Number of axes.
         contiguous: True if contiguous in C order; otherwise strides are determined at run time.
         single: True if the last of several axes has length 1 at compile time, for example for a single run.
         frozen: True if read-only.
     """
 
-    of: Number
+    number: Number
     ndim: int
     contiguous: bool = True
     single: bool = False

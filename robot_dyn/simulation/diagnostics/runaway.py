@@ -62,12 +62,12 @@ def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[
     if isinstance(method, Adaptive) or method.nonsmooth or setup.equation.canonical:
         return ()
     equation, step = setup.equation, setup.taken_step_s if step_s is None else step_s
-    y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
+    y, u_hold = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
-        linear = method, jacobian(equation, 0.0, y, held), len(setup.q0)
+        linear = method, jacobian(equation, 0.0, y, u_hold), len(setup.q0)
         if not excess_rate(*linear)(step) * t > log(EXPLAINS):
             return ()
-        limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
+        limit, motion = longest_step(*linear), fastest(equation, 0.0, y, u_hold)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
     facts = motion.facts | {"method": method.name, "step_s": below(limit)}

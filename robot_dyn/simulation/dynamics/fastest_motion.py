@@ -58,16 +58,16 @@ class Fastest:
         return sentence((MOTION,), self.facts)
 
 
-def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
+def jacobian(equation: StateEquation, t: float, y: Array, u_hold: Array | None) -> Array:
     """Return ∂y'/∂y by differences, without the work integrals, on which y' does not depend.
 
     Args:
         equation: The state equation.
         t: Time, in [s].
         y: State, (m,).
-        held: The actuation in zero-order hold, or None.
+        u_hold: The actuation in zero-order hold, or None.
     """
-    size, rate = len(y) - len(equation.sources), rowwise(lambda row: equation.rate(t, row, held)[0])
+    size, rate = len(y) - len(equation.sources), rowwise(lambda row: equation.rate(t, row, u_hold)[0])
     return by_state(rate, t, y, equation.widths).T[:size, :size]
 
 

@@ -293,5 +293,7 @@ def _unknown(setup: Setup, name: str) -> str:
         return f"{name} names a coefficient of several effects of the plant; give {both}"
     if name.startswith("payload_") and not any(other.startswith("payload_") for other in names):
         payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
-        return f"no {name!r}: the arm has no payload; add one with robot.with_(payload={payload})"
-    return f"no {name!r}; {nearest(name, dict.fromkeys(names))}"
+        return f"no parameter {name!r}: the arm has no payload; add one with robot.with_(payload={payload})"
+    if name.partition(".")[0] in ("q0", "v0"):
+        return f"no parameter {name!r}: initial states vary as arrays; pass q0= and v0=, or vary q0 and v0 of a sweep"
+    return f"no parameter {name!r}; {nearest(name, dict.fromkeys(names))}"

@@ -87,7 +87,7 @@ class Work:
 
     def rows(self, start: int, stop: int) -> Rows:
         """Return the rows of runs start, …, stop − 1."""
-        return self.made(start, stop, None)[0]
+        return self.run_rows(start, stop, None)[0]
 
     def compared(self) -> Comparison:
         """Make some runs, drawn at random, uncut and with steps that end at thresholds, and compare their figures."""
@@ -99,7 +99,7 @@ class Work:
         figures = {name: uncut[name] for name in sweep.figures}
         return Comparison(len(runs), sweep.runs, others, tuple(differences(figures, cut, sweep.units)))
 
-    def made(
+    def run_rows(
         self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None
     ) -> tuple[Rows, dict[str, np.ndarray], OneByOne]:
         """Make runs.

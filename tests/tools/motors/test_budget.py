@@ -171,7 +171,7 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
     assert "for gravity" in found.sentence
     assert any("the peak torque limit of shoulder_pan_joint" in each for each in found.findings)
     free = budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
-    assert free.fits and "no limit is known" in free.sentence
+    assert free.fits and "no limits are known" in free.sentence
     some = budget(PLAN, UR5)  # its file states no continuous torque
     assert "the motors suffice where limits are known; " in some.sentence
     every = budget(PLAN, UR5, continuous=100.0)

@@ -131,9 +131,9 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
         rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, method="Midpoint", step_s=2e-3,
         record_every_s=0.02,
     )  # fmt: skip
-    found = runs.judged(setup, "swing", Budget())
+    found = runs.compared_run(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
-    assert runs.judged(replace(setup, method="DP8"), "swing", Budget()).misleads is False  # rounding
+    assert runs.compared_run(replace(setup, method="DP8"), "swing", Budget()).misleads is False  # rounding
     small = runs.shrunk_run(found, "shrinking", Work())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
@@ -317,7 +317,7 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
     <joint name="hinge" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 1 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="5"/><dynamics damping="5"/></joint></robot>"""
     robot = rd.Robot.from_text(text)
-    setup = limits.held(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
+    setup = limits.holding_setup(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
     found = {
         each.description: each for each in islice(filter(None, limits.step_limits(setup, 0, Work())), 4)
     }  # the explicit ones

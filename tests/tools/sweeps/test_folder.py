@@ -58,7 +58,7 @@ def test_samples_whose_folder_cannot_be_made_are_refused_with_the_chunk(tmp_path
     folder.prepare()
     (folder.samples.path / "q" / "c").write_text("")
     with pytest.raises(SweepError, match=r"^chunk 1 \(runs 20 to 39\): "):
-        folder.write(1, *Work(sweep).made(20, 40, folder.samples.times()))
+        folder.write(1, *Work(sweep).run_rows(20, 40, folder.samples.times()))
     assert folder.missing().tolist() == [0, 1]
 
 
