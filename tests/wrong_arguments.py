@@ -57,7 +57,7 @@ FOR_LOOPS = {
 }
 FOR_LOOPS |= {
     "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "penetration", "reversals", "friction",
-    "bounds", "of", "reflected", "drag",
+    "bounds", "per_joint", "reflected", "drag",
 }  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "CarriedPayload.acts": {"t"},

@@ -81,27 +81,27 @@ def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, 
     return converted(f, x, kind, node), converted(f, y, kind, node)
 
 
-def binary(f: Function, operator: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+def binary(f: Function, operation: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     """Return the result of an operation on two numbers."""
     if x.const is not None and y.const is not None and UINT not in (x.kind, y.kind):
-        return _of_constants(f, operator, x.const, y.const, node)
-    if operator in _BITS and x.kind == y.kind and x.kind != FLOAT:
-        return Scalar(x.kind, getattr(f.builder, _BITS[operator])(x.ir, y.ir))
+        return _of_constants(f, operation, x.const, y.const, node)
+    if operation in _BITS and x.kind == y.kind and x.kind != FLOAT:
+        return Scalar(x.kind, getattr(f.builder, _BITS[operation])(x.ir, y.ir))
     if x.kind == y.kind == BOOL:
         raise f.refused(node, "arithmetic of two truth values", "convert them with int, or write and, or")
-    if operator is ast.Pow:
+    if operation is ast.Pow:
         return _power(f, x, y, node)
-    if operator is ast.Div and UINT not in (x.kind, y.kind):
+    if operation is ast.Div and UINT not in (x.kind, y.kind):
         x, y = converted(f, x, FLOAT, node), converted(f, y, FLOAT, node)
     x, y = together(f, x, y, node)
-    if x.kind == FLOAT and operator in _FLOATING:
-        return Scalar(FLOAT, getattr(f.builder, _FLOATING[operator])(x.ir, y.ir))
+    if x.kind == FLOAT and operation in _FLOATING:
+        return Scalar(FLOAT, getattr(f.builder, _FLOATING[operation])(x.ir, y.ir))
     if x.kind == INT:
-        return _of_integers(f, operator, x, y, node)
-    if x.kind == UINT and (operator in _PLAIN or operator in (ast.LShift, ast.RShift)):
-        return _of_words(f, operator, x, y)
+        return _of_integers(f, operation, x, y, node)
+    if x.kind == UINT and (operation in _PLAIN or operation in (ast.LShift, ast.RShift)):
+        return _of_words(f, operation, x, y)
     raise f.refused(
-        node, f"{operator.__name__} of numbers of type {x.kind.name}", "convert them, or write it differently"
+        node, f"{operation.__name__} of numbers of type {x.kind.name}", "convert them, or write it differently"
     )
 
 
