@@ -1,6 +1,6 @@
 """Declared coefficients: the parameters of an effect, controller or reference, each with unit, sign and meaning.
 
-    damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+    damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", minimum=0, stated="damping"))
 
 The declaration determines how values are checked, whether values by joint name or "urdf" are accepted, and the name in
 scenes and sweeps. It also makes the coefficient an input of machine code.
