@@ -37,9 +37,9 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "Stress", "SweepResult",
-    "Trajectory", "WorkPrecision",
+    "Advice", "CFunction", "CSource", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics",
+    "MotorBudget", "Motors", "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "SampledModel",
+    "Sensitivity", "State", "Stress", "SweepResult", "Trajectory", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -76,7 +76,15 @@ LAX |= {name: {key for key, each in declared(kind).items() if each.infinite} for
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.step, rd.tools.stress, rd.tools.sweeps)
+TOOLS = (
+    rd.tools.doctor,
+    rd.tools.export,
+    rd.tools.motors,
+    rd.tools.proof,
+    rd.tools.step,
+    rd.tools.stress,
+    rd.tools.sweeps,
+)
 ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
@@ -263,6 +271,11 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
+        call(rd.tools.export.c_source, arm_or_plant=robot, quantities=["N"], dtype="float32", name="arm"),
+        call(rd.tools.export.c_source(robot, ["N"]).write, folder=folder / "c", force=True),
+        call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
+        call(rd.tools.export.parameter_values, plant=plant),
+        call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),
         call(rd.tools.motors.budget, motion=rd.control.quintic(q, v, 1.0), plant=plant, payload=rd.Payload("pole",
