@@ -128,10 +128,10 @@ def chosen(equations: Equations, quantities: Iterable[str] | None) -> tuple[str,
     if quantities is None:
         few = QUANTITIES if n <= 8 else ("N", "inverse_dynamics")
         return tuple(name for name in few if name != "forward_dynamics" or singular is None)
-    names = [quantities] if isinstance(quantities, str) else quantities
-    if not isinstance(names, Iterable):
-        raise QueryError(f"quantities must be names, such as ['M', 'N'], got {shown(names)}")
-    names = list(names)
+    try:
+        names = [quantities] if isinstance(quantities, str) else list(quantities)
+    except TypeError:
+        raise QueryError(f"quantities must be names, such as ['M', 'N'], got {shown(quantities)}") from None
     for name in names:
         choice("quantities", name, QUANTITIES)
         if name == "forward_dynamics" and singular is not None:

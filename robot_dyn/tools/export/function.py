@@ -15,6 +15,7 @@ def casadi(arm_or_plant: rd.Robot | rd.Plant, quantity: str, *, open_parameters:
 
     Its inputs are q, v, a or the torque, each (n,), as in the method of that name; then t if an effect depends on the
     time, and p if the parameters are open. M and C are (n, n), the others (n,).
+    Right angles that the file states with few digits are exact, as in `rd.compiled`.
 
     Args:
         arm_or_plant: A robot, or a plant with effects that neither switch nor have states.

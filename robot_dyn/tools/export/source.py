@@ -128,7 +128,7 @@ def c_source(
     """Return C source of M, C, N, inverse and forward dynamics, without heap and without static data.
 
     Parameters of a plant (coefficients of effects, gravity, payloads) are entries of an array p; those of a robot are
-    constants.
+    constants. Right angles that the file states with few digits are exact, as in `rd.compiled`.
 
     Args:
         arm_or_plant: A robot, or a plant with smooth or piecewise effects without states.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import re
 import shutil
 import warnings
@@ -22,6 +23,7 @@ from robot_dyn.tools.export import CSource, c_source
 from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
+from tests.cli.test_command_documents import promised
 from tests.command import run
 from tests.long import long
 from tests.tools.export.c_program import HOST, TARGETS, WRITABLE, call, library, self_test, symbols
@@ -370,6 +372,8 @@ def test_the_command_writes_the_files_and_prints_the_table(tmp_path: Path) -> No
     done = run("export-c", scene, "-o", tmp_path / "out", "--quantities", "N, M")
     assert done.returncode == 0, done.stderr
     assert "inverse" not in done.stdout and "\nN " in done.stdout and done.stderr.count("written") == 4
+    again = run("export-c", scene, "-o", tmp_path / "out", "--quantities", "N", "--force", "--json")
+    assert json.loads(again.stdout).keys() == promised("export-c").keys()
     assert "PLANAR_2R_P_VISCOUS_FRICTION_VISCOUS" in (tmp_path / "out" / "planar_2r_dynamics.h").read_text()
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "planar_2r_dynamics.h", "planar_2r_dynamics.c", "planar_2r_self_test.c", "CMakeLists.txt",
