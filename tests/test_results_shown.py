@@ -31,6 +31,8 @@ CELLS = {
     " methods=['RK4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
     "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=1.0)",
     "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
+    "excite": "rd.tools.identify.excite(arm, 5.0, limits={'lower': -2, 'upper': 2, 'velocity': 2.0, 'torque': 60.0},"
+    " starts=1, compare_longer=False)",
     "info": "rd.info(rd.load('panda'))",
     "why": "rd.why(rd.Plant(arm, [rd.effects.DryFriction(0.7)]), q, q, q, 'joint_2')",
     "linearise": "rd.linearise(arm, q)",

@@ -205,7 +205,7 @@ def test_tests_import_few_names_that_no_folder_lists() -> None:
     assert len(places) <= MOST_INTERNAL
 
 
-TOOL_NAMES = ("doctor", "export", "motors", "proof", "step", "stress", "sweeps")
+TOOL_NAMES = ("doctor", "export", "identify", "motors", "proof", "step", "stress", "sweeps")
 ROOMS = ("effects", "control", "integrate", "accuracy", "tools", *(f"tools.{name}" for name in TOOL_NAMES))
 
 

@@ -37,15 +37,16 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "CFunction", "CSource", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics",
-    "MotorBudget", "Motors", "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "SampledModel",
-    "Sensitivity", "State", "Stress", "SweepResult", "Trajectory", "WorkPrecision",
+    "Advice", "CFunction", "CSource", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
+    "ExpectedPrecision", "InverseKinematics", "MotorBudget", "Motors", "PathPlan", "Plan", "Proof", "Rollouts", "Run",
+    "RunDifference", "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress", "SweepResult", "Trajectory",
+    "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
     "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
     "TaskDynamics", "ButcherTableau", "RosenbrockTable", "Surd", "System",
-    "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
+    "RightSide", "FixedStepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
     "GaussLegendre", "Rosenbrock", "MoreauJean",
 }  # fmt: skip
 # What time loops and traces call, with numbers that were checked before, or symbols.
@@ -79,6 +80,7 @@ SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Set
 TOOLS = (
     rd.tools.doctor,
     rd.tools.export,
+    rd.tools.identify,
     rd.tools.motors,
     rd.tools.proof,
     rd.tools.step,
@@ -89,6 +91,7 @@ ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
 OF_EXTRAS = {"to_pandas", "to_xarray", "samples"}  # take none either, and need packages that may be absent
+OF_GYMNASIUM = {"close", "close_extras", "render", "get_wrapper_attr", "has_wrapper_attr", "set_wrapper_attr"}
 
 
 def public() -> Iterator[str]:
@@ -109,7 +112,7 @@ def public() -> Iterator[str]:
             shows = issubclass(thing, Answer) and method in SHOWS
             if method.startswith("_") or not callable(getattr(thing, method)):
                 continue
-            if not (field or for_loops or shows or method in OF_EXTRAS):
+            if not (field or for_loops or shows or method in OF_EXTRAS | OF_GYMNASIUM):
                 yield f"{name}.{method}"
 
 
@@ -138,8 +141,19 @@ def examples(folder: Path) -> dict[str, Example]:
     table, motors = folder / "samples.csv", folder / "motors.csv"
     motors.write_text("joint,peak [N m]\nslide,50\n")
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
+    excited = rd.tools.identify.excite(robot, 5.0, limits={"velocity": 2.0}, starts=1, compare_longer=False)
+    states = np.random.default_rng(0).uniform(-1, 1, (12, 2))
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
+    arms = rd.tools.step.Stepper(plant, 2)
+    arms.reset(q)
+    task: dict[str, Any] = {
+        "start": lambda rng: (q, v), "reward": lambda state, action, goal: np.ones(len(state.q)), "low": [-9.0, -1.0],
+        "high": 9.0, "time_limit_s": 1.0, "terminated": lambda state, goal: state.q[:, 0] > 9.0,
+        "goal": lambda rng: rng.normal(size=2), "observe": lambda state, goal: state.q,
+    }  # fmt: skip
+    learning = rd.tools.step.VectorEnv(rd.tools.step.Stepper(plant, 2), **task)
+    single = rd.tools.step.Env(rd.tools.step.Stepper(plant, 1), **task)
     system = System(lambda t, y: -y, 1)
     given = {"q": q, "v": v, "a": u, "tau": u}
     made: dict[str, Example] = {
@@ -276,6 +290,12 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
         call(rd.tools.export.parameter_values, plant=plant),
         call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
+        call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
+            tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),
+        call(rd.tools.identify.Poses, q=states, tau=states, approach=np.ones((12, 2))),
+        call(rd.tools.identify.static, arm=robot, poses=rd.tools.identify.Poses(states, robot.N(states)), friction=0.5,
+            noise=0.1, tilt=False),
+        call(excited.save, path=folder / "excitation.csv"),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),
         call(rd.tools.motors.budget, motion=rd.control.quintic(q, v, 1.0), plant=plant, payload=rd.Payload("pole",
@@ -290,6 +310,17 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
         call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
+        call(rd.tools.step.Stepper, plant=plant, n=2, period_s=0.02, controller=sampled, step_s=2e-3, method="RK4",
+            vary={"kp": [8.0, 9.0]}, uncut=True, ledger=True, threads=1),
+        call(arms.reset, q=q, v=v, mask=[True, False]),
+        call(arms.step, action=[u, u]),
+        call(arms.set_state, state=arms.state, mask=[True, False]),
+        call(rd.tools.step.VectorEnv, stepper=arms, **task),
+        call(learning.reset, seed=3),
+        call(learning.step, actions=[u / 2, u / 2]),
+        call(rd.tools.step.Env, stepper=rd.tools.step.Stepper(plant, 1), **task),
+        call(single.reset, seed=3),
+        call(single.step, action=u / 2),
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),

@@ -111,7 +111,7 @@ class RunDifference(Result):
 
     @reported
     def is_conclusive(self) -> bool:
-        """Return True if half of the time or more was compared; otherwise no run is reported equal."""
+        """True if half of the time or more was compared; otherwise no run is reported equal."""
         return self.fraction >= HALF
 
     @property

@@ -14,6 +14,7 @@ from robot_dyn.codegen.program import Program as Program
 from robot_dyn.codegen.self_check import SelfCheckError as SelfCheckError
 from robot_dyn.codegen.store.cache import CacheWarning as CacheWarning
 from robot_dyn.codegen.store.cache import Store as Store
+from robot_dyn.codegen.store.cache import default_store as default_store
 from robot_dyn.codegen.store.keys import digest_of_texts as digest_of_texts
 from robot_dyn.codegen.store.keys import processor_of_code as processor_of_code
 from robot_dyn.codegen.threads import thread_count as thread_count

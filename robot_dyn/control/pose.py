@@ -30,6 +30,8 @@ from robot_dyn.queries.units import of_joint
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from robot_dyn.foundations.validate import JointValues
+
 
 _SOUGHT = 1e-11  # largest ‖e‖ of a descent, in [m] and [rad]: below usual tolerances, above rounding
 _ROTATION = 1e-6  # largest entry of RᵀR − 1 for a rotation
@@ -79,7 +81,7 @@ class InverseKinematics(Answer, Value):
 
     @reported
     def unique(self) -> bool:
-        """Return True if all converged starts gave the same solution."""
+        """True if all converged starts gave the same solution."""
         return len(self.solutions) == 1
 
     def blocks(self) -> Iterator[Block]:
@@ -106,7 +108,7 @@ def inverse_kinematics(
     pose: ArrayLike | tuple[ArrayLike, ArrayLike | None],
     *,
     frame: str,
-    q0: ArrayLike | None = None,
+    q0: JointValues | None = None,
     seed: int = 0,
     starts: int = 20,
     tolerance: float = 1e-9,
@@ -125,7 +127,8 @@ def inverse_kinematics(
         pose: Pose of the frame in base axes, as `arm.placement` returns it, (4, 4); or a pair of a position, (3,), in
             [m], and a rotation, (3, 3), or None to leave the orientation free.
         frame: Name of a link.
-        q0: The first start, (n,), in [rad] or [m]; by default the middle between the limits, or 0 without limits.
+        q0: The first start, (n,) or by joint name, in [rad] or [m]; by default the middle between the limits, or 0
+            without limits.
         seed: Seed of the random starts.
         starts: Number of starts, including q0.
         tolerance: Largest error of position, in [m], and of rotation, in [rad], at a solution.

@@ -7,6 +7,7 @@ Each piece is the Hermite polynomial of the values and derivatives at its two en
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import factorial, isfinite, perm
@@ -22,6 +23,8 @@ from robot_dyn.foundations.values import ArrayField, Value
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from robot_dyn.foundations.validate import JointValues
 
 
 # number of prescribed values at each end of a piece, by kind of spline
@@ -133,22 +136,31 @@ def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
     return q, v, 2 * a
 
 
-def hold(q: ArrayLike) -> PiecewisePolynomial:
-    """Return a reference at rest at q, shape (n,); raise a ControlError for other shapes."""
-    return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
+def hold(q: JointValues, *, joint_names: Sequence[str] | None = None) -> PiecewisePolynomial:
+    """Return a reference at rest at q.
+
+    Args:
+        q: Position, shape (n,), in [rad] or [m]; or by joint name, 0 for joints left out.
+        joint_names: Joints in the order of q, such as `arm.joint_names`; required for values by joint name.
+
+    Raises:
+        ControlError: If q has another shape, or names an unknown joint.
+    """
+    return PiecewisePolynomial([0.0, 1.0], _of_joints("q", q, joint_names, ("n",))[None, None])
 
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def quintic(
-    q0: ArrayLike,
-    q1: ArrayLike,
+    q0: JointValues,
+    q1: JointValues,
     duration_s: float,
     *,
     start_s: float = 0.0,
-    v0: ArrayLike = 0.0,
-    v1: ArrayLike = 0.0,
-    a0: ArrayLike = 0.0,
-    a1: ArrayLike = 0.0,
+    v0: JointValues = 0.0,
+    v1: JointValues = 0.0,
+    a0: JointValues = 0.0,
+    a1: JointValues = 0.0,
+    joint_names: Sequence[str] | None = None,
 ) -> PiecewisePolynomial:
     """Return the quintic from q0 to q1.
 
@@ -156,7 +168,8 @@ def quintic(
     at 15/8 · (q1 − q0)/duration_s.
 
     Args:
-        q0: Initial position, shape (n,), in [rad] or [m].
+        q0: Initial position, shape (n,), in [rad] or [m]; like all values of joints, also by joint name, 0 for joints
+            left out.
         q1: Final position, shape (n,).
         duration_s: Duration, in [s], positive.
         start_s: Start time, in [s].
@@ -164,26 +177,27 @@ def quintic(
         v1: Velocity at the end, a scalar or (n,), in [rad/s] or [m/s].
         a0: Acceleration at the start, a scalar or (n,), in [rad/s²] or [m/s²].
         a1: Acceleration at the end, a scalar or (n,), in [rad/s²] or [m/s²].
+        joint_names: Joints in the order of q, such as `arm.joint_names`; required for values by joint name.
 
     Raises:
-        ControlError: If a value is not finite or has the wrong shape.
+        ControlError: If a value is not finite, has the wrong shape, or names an unknown joint.
 
     Source: Siciliano et al. 2009, sec. 4.2.1; Flash and Hogan, The coordination of arm movements, 1985.
     """
     T, begin = duration("duration_s", duration_s, error=ControlError), number("start_s", start_s)
-    q0 = numbers("q0", q0, ("n",))
-    shape = q0.shape
-    q1 = numbers("q1", q1, shape)
-    v0, v1 = numbers("v0", v0, (), shape), numbers("v1", v1, (), shape)
-    a0, a1 = numbers("a0", a0, (), shape), numbers("a1", a1, (), shape)
-    ends = np.stack(np.broadcast_arrays(q0, v0, a0, q1, v1, a1))
+    first = _of_joints("q0", q0, joint_names, ("n",))
+    last = _of_joints("q1", q1, joint_names, first.shape)
+    rates = {"v0": v0, "a0": a0, "v1": v1, "a1": a1}
+    v, a, v_end, a_end = (_of_joints(name, x, joint_names, (), first.shape) for name, x in rates.items())
+    ends = np.stack(np.broadcast_arrays(first, v, a, last, v_end, a_end))
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
 def via_points(
-    times_s: ArrayLike, points: ArrayLike, *, kind: str = "quintic", v0: ArrayLike = 0.0, v1: ArrayLike = 0.0
-) -> PiecewisePolynomial:
+    times_s: ArrayLike, points: JointValues, *, kind: str = "quintic", v0: JointValues = 0.0, v1: JointValues = 0.0,
+    joint_names: Sequence[str] | None = None,
+) -> PiecewisePolynomial:  # fmt: skip
     """Return the spline through points at prescribed times, from rest to rest unless end velocities are passed.
 
     "quintic" has four continuous derivatives and starts and ends with zero acceleration; "cubic" has two, and its
@@ -191,10 +205,12 @@ def via_points(
 
     Args:
         times_s: Increasing times, shape (k + 1,), in [s].
-        points: Shape (k + 1, n), in [rad] or [m].
+        points: Shape (k + 1, n), in [rad] or [m]; like velocities, also by joint name, 0 for joints left out: a list
+            of such points, or (k + 1,) by joint.
         kind: "quintic" or "cubic".
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
         v1: Velocity at the end, a scalar or (n,), in [rad/s] or [m/s].
+        joint_names: Joints in the order of q, such as `arm.joint_names`; required for values by joint name.
 
     Raises:
         ControlError: If times do not increase, shapes do not match, the kind is unknown, or there are over 2000 points.
@@ -202,18 +218,24 @@ def via_points(
     Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
     """
     kind = choice("kind of spline", kind, _DERIVATIVES, error=ControlError)
-    m, points = _DERIVATIVES[kind], numbers("points", points, ("k + 1", "n"))
-    if len(points) < 2:
-        raise ControlError(f"points: at least 2 are needed, got {len(points)}; to rest at one point, use hold(q)")
-    if len(points) > _MOST_POINTS:
-        raise ControlError(f"points: at most {_MOST_POINTS} are allowed, got {len(points)}; use rd.control.Samples")
-    t = increasing("times_s", times_s, len(points))
+    m, rows = _DERIVATIVES[kind], _of_joints("points", points, joint_names, ("k + 1", "n"))
+    if len(rows) < 2:
+        raise ControlError(f"points: at least 2 are needed, got {len(rows)}; to rest at one point, use hold(q)")
+    if len(rows) > _MOST_POINTS:
+        raise ControlError(f"points: at most {_MOST_POINTS} are allowed, got {len(rows)}; use rd.control.Samples")
+    t = increasing("times_s", times_s, len(rows))
     unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
-    shape = points.shape[1:]
-    ends = np.stack([np.broadcast_to(numbers(name, v, (), shape), shape) for name, v in (("v0", v0), ("v1", v1))])
-    data = _smooth_derivatives(np.diff(t) / unit, points, m, ends * unit)
+    shape = rows.shape[1:]
+    rates = (_of_joints(name, v, joint_names, (), shape) for name, v in (("v0", v0), ("v1", v1)))
+    ends = np.stack([np.broadcast_to(v, shape) for v in rates])
+    data = _smooth_derivatives(np.diff(t) / unit, rows, m, ends * unit)
     pieces = hermite(np.diff(t) / unit, np.concatenate([data[:-1], data[1:]], axis=1))
     return PiecewisePolynomial(t, pieces / unit ** np.arange(2.0 * m)[:, None])
+
+
+def _of_joints(what: str, values: object, joint_names: Sequence[str] | None, *shapes: validate.Shape) -> np.ndarray:
+    """Return finite numbers of one of the shapes, from an array or by joint name."""
+    return numbers(what, validate.in_order(what, values, joint_names, error=ControlError), *shapes)
 
 
 def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:

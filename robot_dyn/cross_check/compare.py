@@ -146,4 +146,4 @@ def _notes(robot: Robot, unsolved: int, samples: int) -> tuple[str, ...]:
         )
     if robot.joint_without_inertia is not None:
         notes.append(f"no forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
-    return (*notes, *robot.findings)
+    return (*notes, *robot.announced_findings)

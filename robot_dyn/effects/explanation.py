@@ -30,7 +30,13 @@ EDITED = {
 @final
 @dataclass(frozen=True)
 class Number:
-    """A number of a scene, its key, and its source: "scene", "default" or "the robot's file"."""
+    """A number of a scene.
+
+    Attributes:
+        key: Key in the scene.
+        value: The number or numbers, as text.
+        source: "scene", "default" or "the robot's file".
+    """
 
     key: str
     value: str

@@ -37,7 +37,7 @@ class Hold:
 
     @reported
     def margin(self) -> float:
-        """Return the smallest change of load, in either direction, at which the joint breaks away; at least 0."""
+        """Smallest change of load, in either direction, at which the joint breaks away; at least 0."""
         return max(min(self.load - self.lower_breakaway, self.upper_breakaway - self.load), 0.0)
 
 

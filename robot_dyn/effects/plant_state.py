@@ -36,7 +36,7 @@ class PlantState(Answer, Value):
         joints: Names of the n joints.
         types: Types of the joints, such as "revolute".
         q, v, a, tau: The state, (n,), in SI units.
-        M, C: (n, n).
+        M, C: Mass matrix and Coriolis matrix, (n, n).
         N: Gravity minus the torques of effects, (n,), in [N m] or [N].
         effects: Torque of each effect on the joints, (n,), by name.
         held: The joints that dry friction and rigid stops hold; () if tau follows from a.
@@ -133,7 +133,7 @@ def plant_state(
     remarks = (
         *degree_lines(robot.joint_names, robot.joint_types, q, robot.lower, robot.upper),
         *order_lines(robot.joint_names, robot.file_order),
-        *gravity_lines(robot.edits.gravity, robot.gravity_free, robot.n),
+        *gravity_lines(robot.edits.gravity, robot.gravity_free, robot.balanced, robot.n),
     )
     return PlantState(
         robot.name, robot.edits.gravity, robot.gravity_acts, remarks, robot.joint_names, robot.joint_types,

@@ -85,12 +85,14 @@ from robot_dyn.foundations.validate import JointValues as JointValues
 from robot_dyn.foundations.validate import choice as choice
 from robot_dyn.foundations.validate import duration as duration
 from robot_dyn.foundations.validate import function as function
+from robot_dyn.foundations.validate import in_order as in_order
 from robot_dyn.foundations.validate import instance as instance
 from robot_dyn.foundations.validate import integer as integer
 from robot_dyn.foundations.validate import joint_values as joint_values
 from robot_dyn.foundations.validate import number as number
 from robot_dyn.foundations.validate import numbers as numbers
 from robot_dyn.foundations.validate import one_state as one_state
+from robot_dyn.foundations.validate import shaped as shaped
 from robot_dyn.foundations.validate import truth as truth
 from robot_dyn.foundations.values import OnFirstUse as OnFirstUse
 from robot_dyn.foundations.values import Value as Value

@@ -161,11 +161,17 @@ class PrecisionWarning(RobotDynWarning):
     """A result with fewer digits than requested by `rd.accuracy.warn_below`, or of a nearly singular robot."""
 
 
-def announce(robot: str, findings: Sequence[str]) -> None:
-    """Issue one ModelWarning if there are findings about a robot, at the line that loads it, three calls above."""
+def announce(robot: str, findings: Sequence[str], total: int) -> None:
+    """Issue one ModelWarning with the first finding about a robot, at the line that loads it, three calls above.
+
+    Args:
+        robot: Name of the robot.
+        findings: Findings to warn of; without any there is no warning.
+        total: Number of all findings.
+    """
     if findings:
-        more = f" (the first of {len(findings)} findings; see Robot.findings or robot-dyn info for all)"
-        text = f"{robot}: {findings[0]}{more if len(findings) > 1 else ''}"
+        more = f" (the first of {total} findings; see Robot.findings or robot-dyn info for all)"
+        text = f"{robot}: {findings[0]}{more if total > 1 else ''}"
         warnings.warn(text, ModelWarning, stacklevel=4)
 
 

@@ -11,7 +11,7 @@ from math import hypot, inf, isfinite
 from numbers import Real
 from operator import index
 from types import UnionType
-from typing import Protocol, SupportsIndex, TypeAlias, TypeGuard, TypeVar, overload
+from typing import Any, Protocol, SupportsIndex, TypeAlias, TypeGuard, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,8 +29,8 @@ from robot_dyn.foundations.errors import (
 
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
-JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike]
-"""Numbers of each joint, (..., n); or by joint name, (...), where joints left out have 0."""
+JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike]]
+"""Numbers of each joint, (..., n); or by joint name, (...), where joints left out have 0; or a list of such rows."""
 Instance = TypeVar("Instance")
 Function = TypeVar("Function")
 LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
@@ -233,26 +233,49 @@ def shaped(
     try:
         array = real(values) if arithmetic is None or arithmetic.dtype.kind == "f" else arithmetic.asarray(values)
     except (TypeError, ValueError, OverflowError) as fault:
-        if isinstance(values, Mapping):
-            return shaped(what, _in_order(what, values, joint_names), joint_names, arithmetic)
+        if (array := in_order(what, values, joint_names)) is not values:
+            return shaped(what, array, joint_names, arithmetic)
         raise QueryError(f"{what} must be an array of {n} real numbers, got {fault}") from None
     if array.ndim == 0 or array.shape[-1] != n:
         raise QueryError(f"{what} must have shape ({n},) or (..., {n}), got {array.shape}")
     return array
 
 
-def _in_order(what: str, values: Mapping[str, object], joint_names: Sequence[str]) -> np.ndarray:
-    """Return numbers by joint name as an array, (..., n); 0 for joints left out."""
+def in_order(
+    what: str, values: object, joint_names: Sequence[str] | None, *, elsewhere: float = 0.0, error: Kind = QueryError
+) -> Any:
+    """Return numbers by joint name, or a list of such rows, as an array, (..., n); other values as they are.
+
+    Args:
+        what: Name of the argument in messages.
+        values: The argument.
+        joint_names: Names of the n joints, in the order of q; None if the caller was given none.
+        elsewhere: Number of joints left out.
+        error: Type of the error.
+    """
+    if isinstance(values, list | tuple) and values and all(isinstance(row, Mapping) for row in values):
+        rows = [
+            in_order(f"{what}[{i}]", row, joint_names, elsewhere=elsewhere, error=error) for i, row in enumerate(values)
+        ]
+        return np.stack(_one_shape(what, dict(enumerate(rows)), error))
+    if not isinstance(values, Mapping):
+        return values
+    if joint_names is None:
+        raise error(f"{what}: numbers by joint have no order here; give joint_names=, such as arm.joint_names")
     if not values:
-        raise QueryError(f"{what}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
+        raise error(f"{what}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
     for name in values:
         if name not in joint_names:
-            raise QueryError(f"{what}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
+            raise error(f"{what}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
+    return np.stack(_one_shape(what, {name: values.get(name, elsewhere) for name in joint_names}, error), axis=-1)
+
+
+def _one_shape(what: str, arrays: Mapping[Any, object], error: Kind) -> list[np.ndarray]:
     try:
-        return np.stack(np.broadcast_arrays(*[np.asarray(values.get(name, 0.0)) for name in joint_names]), axis=-1)
+        return [*np.broadcast_arrays(*map(np.asarray, arrays.values()))]
     except ValueError:
-        shapes = {name: np.shape(np.asarray(x)) for name, x in values.items()}
-        raise QueryError(f"{what}: numbers of all joints must have one shape, got {shapes}") from None
+        shapes = {name: np.shape(np.asarray(x)) for name, x in arrays.items()}
+        raise error(f"{what}: numbers of all joints must have one shape, got {shapes}") from None
 
 
 def converted(

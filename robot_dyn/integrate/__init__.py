@@ -6,7 +6,7 @@
     stiff, fixed steps Rosenbrock
     with impacts       MoreauJean
     to write one       ButcherTableau, RosenbrockTable, Surd: coefficients as data
-                       Integrator, PlainMethod: base classes; Stepper, System, RightSide
+                       Integrator, PlainMethod: base classes; FixedStepper, System, RightSide
     results            Solution, Status; IntegrationError
 
 docs/developers/extending.md adds a method step by step; robot_dyn/integrate/README.md lists its files.

@@ -5,11 +5,11 @@ from robot_dyn.integrate.controlled_steps import Status as Status
 from robot_dyn.integrate.explicit import ExplicitRungeKutta as ExplicitRungeKutta
 from robot_dyn.integrate.explicit import SemiImplicitEuler as SemiImplicitEuler
 from robot_dyn.integrate.gauss import GaussLegendre as GaussLegendre
+from robot_dyn.integrate.integrator import FixedStepper as FixedStepper
 from robot_dyn.integrate.integrator import IntegrationError as IntegrationError
 from robot_dyn.integrate.integrator import Integrator as Integrator
 from robot_dyn.integrate.integrator import PlainMethod as PlainMethod
 from robot_dyn.integrate.integrator import RightSide as RightSide
-from robot_dyn.integrate.integrator import Stepper as Stepper
 from robot_dyn.integrate.integrator import System as System
 from robot_dyn.integrate.methods import method as method
 from robot_dyn.integrate.rosenbrock import Rosenbrock as Rosenbrock

@@ -16,7 +16,7 @@ from robot_dyn.foundations.arithmetic import Arithmetic, Array, Scalar
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.dop853 import table
-from robot_dyn.integrate.integrator import PlainMethod, RightSide, States, Stepper
+from robot_dyn.integrate.integrator import FixedStepper, PlainMethod, RightSide, States
 from robot_dyn.integrate.primitives import combination, evaluate
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients
 
@@ -28,7 +28,7 @@ class Stages(NamedTuple):
 
 
 def explicit_step(f: RightSide, tableau: Coefficients, work: Stages, t: Scalar, h: Scalar, x: States) -> int:
-    """Take a step of an explicit Runge–Kutta method; see `Stepper` for the arguments."""
+    """Take a step of an explicit Runge–Kutta method; see `FixedStepper` for the arguments."""
     y, after, p, run_parameters, K, s = x.y, x.after, x.p, x.run_parameters, work.K, len(tableau.c)
     evaluate(f.rate, t, y, p, run_parameters, K[0])
     for i in range(1, s):
@@ -62,9 +62,9 @@ class ExplicitRungeKutta(PlainMethod):
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper:
+    ) -> FixedStepper:
         K = aligned((len(self.tableau.b), rows, runs), kind.dtype)
-        return Stepper(explicit_step, self.tableau.arrays(kind), Stages(K))
+        return FixedStepper(explicit_step, self.tableau.arrays(kind), Stages(K))
 
 
 class Start(NamedTuple):
@@ -75,7 +75,7 @@ class Start(NamedTuple):
 
 
 def semi_implicit_step(f: RightSide, start: Start, work: Stages, t: Scalar, h: Scalar, x: States) -> int:
-    """Take a step of semi-implicit Euler; see `Stepper` for the arguments."""
+    """Take a step of semi-implicit Euler; see `FixedStepper` for the arguments."""
     n, y, after = start.n, x.y, x.after
     evaluate(f.rate, t, y, x.p, x.run_parameters, work.K[0])
     combination(after, y, h, start.b, work.K, 1)
@@ -101,8 +101,8 @@ class SemiImplicitEuler(PlainMethod):
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper:
-        return Stepper(semi_implicit_step, Start(n, kind.array([1])), Stages(aligned((1, rows, runs), kind.dtype)))
+    ) -> FixedStepper:
+        return FixedStepper(semi_implicit_step, Start(n, kind.array([1])), Stages(aligned((1, rows, runs), kind.dtype)))
 
 
 _HALF, _THIRD, _SIXTH = Fraction(1, 2), Fraction(1, 3), Fraction(1, 6)

@@ -21,11 +21,11 @@ from robot_dyn.foundations.errors import OverflowedError, QueryError
 from robot_dyn.foundations.validate import integer
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.integrator import (
+    FixedStepper,
     IntegrationError,
     PlainMethod,
     RightSide,
     States,
-    Stepper,
     System,
     arithmetic_like,
 )
@@ -79,7 +79,7 @@ class Increments(NamedTuple):
 
 
 def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Scalar, h: Scalar, x: States) -> int:
-    """Take a step of a Gauss method; see `Stepper` for the arguments."""
+    """Take a step of a Gauss method; see `FixedStepper` for the arguments."""
     y, after, Z, m, s = x.y, x.after, work.Z, len(x.y), len(tableau.c)
     Z[...] = tableau.zero
     work.least[...], work.stale[...], work.state[...] = np.inf, 0, GOING
@@ -130,13 +130,13 @@ class GaussLegendre(PlainMethod):
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper:
+    ) -> FixedStepper:
         s = len(self.tableau.b)
         K, Z, new = (aligned(shape, kind.dtype) for shape in ((1, rows, runs), (s, m, runs), (s, m, runs)))
         stale, state = np.empty(runs, np.int64), np.empty(runs, np.int64)
         least, epsilon = np.empty((m, runs)), float(unit_roundoff(K))
         work = Increments(K=K, Z=Z, new=new, least=least, stale=stale, state=state, epsilon=epsilon)
-        return Stepper(gauss_step, self.tableau.arrays(kind), work)
+        return FixedStepper(gauss_step, self.tableau.arrays(kind), work)
 
     def step(self, system: System, t: Scalar, y: Array, h: Scalar) -> Array:
         try:

@@ -104,7 +104,7 @@ class States(NamedTuple):
     failed: Array
 
 
-class Stepper(NamedTuple):
+class FixedStepper(NamedTuple):
     """A method prepared for a time loop, for states (m, W).
 
     Attributes:
@@ -170,7 +170,7 @@ class Integrator(ABC):
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper:
+    ) -> FixedStepper:
         """Return the method prepared for a time loop.
 
         Args:
@@ -205,7 +205,7 @@ class Integrator(ABC):
             x.after[:, 0] = self.step(System(rate, n, widths, exact), t, x.y[:, 0].copy(), h)
             return evaluations
 
-        return Stepper(step, None, Latest(K))
+        return FixedStepper(step, None, Latest(K))
 
 
 class PlainMethod(Integrator):
@@ -216,7 +216,7 @@ class PlainMethod(Integrator):
     @abstractmethod
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper: ...
+    ) -> FixedStepper: ...
 
     def step(self, system: System, t: Scalar, y: Array, h: Scalar) -> Array:
         after, failed, _ = self.stepped(system, t, y, h)

@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array, Scalar
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
-from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, States, Stepper
+from robot_dyn.integrate.integrator import FixedStepper, IntegrationError, PlainMethod, RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, evaluate, factor, norm, solve, subtract
 from robot_dyn.integrate.rosenbrock_table import RODAS5P, Numbers, RosenbrockTable
 from robot_dyn.integrate.step_control import ControlledStepper
@@ -84,7 +84,7 @@ def stages(f: RightSide, table: Numbers, work: Linear, t: Scalar, h: Scalar, x: 
 
 
 def rosenbrock_step(f: RightSide, table: Numbers, work: Linear, t: Scalar, h: Scalar, x: States) -> int:
-    """Take a step of a Rosenbrock method; see `Stepper` for the arguments."""
+    """Take a step of a Rosenbrock method; see `FixedStepper` for the arguments."""
     first = begin(f, table, work, t, x)
     return first + stages(f, table, work, t, h, x)
 
@@ -138,10 +138,10 @@ class Rosenbrock(PlainMethod):
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper:
+    ) -> FixedStepper:
         if kind.dtype == object:
             raise QueryError(f"{self.name} supports floats, not balls; convert y, or use an explicit or a Gauss method")
-        return Stepper(rosenbrock_step, self.table.numbers(kind, m), self._work(kind, m, rows, runs, m))
+        return FixedStepper(rosenbrock_step, self.table.numbers(kind, m), self._work(kind, m, rows, runs, m))
 
     def controlled(self, m: int, rows: int, bounded: int) -> ControlledStepper:
         """Return the method with error control; see `dop853.stepper` for the arguments."""

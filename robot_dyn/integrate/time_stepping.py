@@ -18,7 +18,7 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, Scalar
 from robot_dyn.foundations.convex import active_set
-from robot_dyn.integrate.integrator import PlainMethod, RightSide, States, Stepper, System, arithmetic_like
+from robot_dyn.integrate.integrator import FixedStepper, PlainMethod, RightSide, States, System, arithmetic_like
 from robot_dyn.integrate.primitives import copy, evaluate
 
 
@@ -74,7 +74,7 @@ class Work(NamedTuple):
 
 
 def time_step(f: RightSide, rows: Problem, work: Work, t: Scalar, h: Scalar, x: States) -> int:
-    """Take a step; see `Stepper` for the arguments. The solution starts from the places of the previous step."""
+    """Take a step; see `FixedStepper` for the arguments. The solution starts from the places of the previous step."""
     n, m, out, y, after = len(work.M), len(x.y), work.out, x.y, x.after
     copy(work.y[:m], y)
     for b in range(y.shape[1]):
@@ -139,7 +139,7 @@ class MoreauJean(PlainMethod):
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
-    ) -> Stepper:
+    ) -> FixedStepper:
         places, most = problem_rows(n), (m - 2 * n) * (n + 1)
         work = Work(
             K=np.zeros((1, rows, runs)),
@@ -150,7 +150,7 @@ class MoreauJean(PlainMethod):
             problem=np.empty((6, n)),
             L=np.empty((n + 1, n)),
         )
-        return Stepper(time_step, places, work)
+        return FixedStepper(time_step, places, work)
 
     def step(self, system: System, t: Scalar, y: Array, h: Scalar) -> Array:
         n, h = system.n, arithmetic_like(y).number(h)

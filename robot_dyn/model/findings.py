@@ -34,9 +34,8 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
     """Return findings about a description, then about the robot with its edits: location, problem and remedy."""
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach,
-        centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_limits, equal_limits,
-        followers_beyond_limits,
-        impossible_inertias_of_the_base,
+        centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_efforts, zero_speeds, equal_limits,
+        followers_beyond_limits, impossible_inertias_of_the_base,
     )  # fmt: skip
     robot = structure_of(description, edits)
     of_kinds = (finding for kind in kinds for finding in kind(robot))
@@ -63,7 +62,7 @@ def impossible_inertias(robot: Structure) -> Iterator[str]:
     """Report moving links, before merging, with impossible mass and moments."""
     for name, link in robot.links.items():
         if name not in robot.base and (why := _why_impossible(link)):
-            yield f"link {name!r}: {why}; correct the inertia of this link"
+            yield f"link {name!r}: {why}; correct the inertia of this link: its numbers, their order or signs"
 
 
 def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:
@@ -166,14 +165,22 @@ def large_ratios(robot: Structure) -> Iterator[str]:
             )
 
 
-def zero_limits(robot: Structure) -> Iterator[str]:
-    """Report effort and velocity limits of 0, usually values that were never filled in."""
-    for limit, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
-        if names := [name for name in robot.free if getattr(robot.joints[name], limit) == 0]:
-            yield (
-                f"{_joints(names)}: the {limit} limit is 0, which allows no {limit} at all; give the limit in {unit},"
-                f" or remove {limit} if there is none"
-            )
+def zero_efforts(robot: Structure) -> Iterator[str]:
+    """Report effort limits of 0, usually values that were never filled in. Only comparisons of torques use them."""
+    return _zero_limits(robot, "effort", "N m or N")
+
+
+def zero_speeds(robot: Structure) -> Iterator[str]:
+    """Report velocity limits of 0, usually values that were never filled in."""
+    return _zero_limits(robot, "velocity", "rad/s or m/s")
+
+
+def _zero_limits(robot: Structure, limit: str, unit: str) -> Iterator[str]:
+    if names := [name for name in robot.free if getattr(robot.joints[name], limit) == 0]:
+        yield (
+            f"{_joints(names)}: the {limit} limit is 0, which allows no {limit} at all; give the limit in {unit},"
+            f" or remove {limit} if there is none"
+        )
 
 
 def equal_limits(robot: Structure) -> Iterator[str]:

@@ -13,7 +13,7 @@ from robot_dyn.description.edits import Edits, Payload
 from robot_dyn.description.other_programs import Statement, in_words
 from robot_dyn.description.structure import Structure
 from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.model.remarks import gravity_lines, order_lines
+from robot_dyn.model.remarks import gravity_lines, order_lines, short_order
 
 _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature"
 
@@ -21,7 +21,18 @@ _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", 
 @final
 @dataclass(frozen=True)
 class Joint:
-    """A joint: limits in [rad] or [m], [N m] or [N] and per second; unstated values are infinite or 0."""
+    """A joint of the robot.
+
+    Attributes:
+        name: Name of the joint.
+        kind: "revolute", "continuous" or "prismatic".
+        lower, upper: Position limits, in [rad] or [m]; infinite if not stated.
+        effort_limit: Largest torque or force, in [N m] or [N]; infinite if not stated.
+        velocity_limit: Largest velocity, in [rad/s] or [m/s]; infinite if not stated.
+        damping: Coefficient of viscous friction, in [N m s/rad] or [N s/m]; 0 if not stated.
+        friction: Torque or force of dry friction, in [N m] or [N]; 0 if not stated.
+        armature: Reflected rotor inertia of the robot, in [kg m²] or [kg].
+    """
 
     name: str
     kind: str
@@ -37,7 +48,14 @@ class Joint:
 @final
 @dataclass(frozen=True)
 class Coupling:
-    """A joint that follows another one: q = multiplier · q_source + offset."""
+    """A joint that follows another one: q = multiplier · q_source + offset.
+
+    Attributes:
+        joint: Name of the follower.
+        source: Name of the joint that it follows.
+        multiplier: Ratio of the positions.
+        offset: Position of the follower where the source is at 0, in [rad] or [m].
+    """
 
     joint: str
     source: str
@@ -58,6 +76,7 @@ class Info(Answer):
         gravity: Acceleration of free fall in base axes, in [m/s²].
         gravity_acts: True if gravity exerts a torque on a joint at some position.
         gravity_free: Joints on which gravity exerts no torque at any position, as the robot is mounted.
+        balanced: Joints on which gravity exerts no torque in any mounting.
         file_order: Independent joints in the order of the file.
         joints: Independent joints, in the order of q.
         couplings: Joints that follow another one, as stated by the file.
@@ -79,6 +98,7 @@ class Info(Answer):
     gravity: tuple[float, float, float]
     gravity_acts: bool
     gravity_free: tuple[str, ...]
+    balanced: tuple[str, ...]
     file_order: tuple[str, ...]
     joints: tuple[Joint, ...]
     couplings: tuple[Coupling, ...]
@@ -93,7 +113,7 @@ class Info(Answer):
     def blocks(self) -> Iterator[Block]:
         yield _heading(self.robot, self.n, self.total_mass, self.gravity)
         yield abbreviated(self.source)
-        yield from gravity_lines(self.gravity, self.gravity_free, self.n)
+        yield from gravity_lines(self.gravity, self.gravity_free, self.balanced, self.n)
         yield from order_lines(tuple(joint.name for joint in self.joints), self.file_order)
         yield Table(_HEADINGS, tuple(tuple(vars(joint).values()) for joint in self.joints), digits=4)
         yield "units: rad and N m for revolute joints, m and N for prismatic joints; —: not stated"
@@ -108,10 +128,11 @@ class Info(Answer):
         yield from (f"finding: {finding}" for finding in self.findings)
 
 
-def robot_line(name: str, n: int, total_mass: float, edits: Edits) -> str:
+def robot_line(name: str, joints: tuple[str, ...], file_order: tuple[str, ...], total_mass: float, edits: Edits) -> str:
     """Return the `repr` of a robot: one line, also used within the `repr` of controllers and other values."""
-    heading = _heading(name, n, total_mass, edits.gravity)
-    return f"<Robot: {'; '.join((heading, *_edits(dict(edits.lock), edits.payloads), *_other_edits(edits)))}>"
+    heading = _heading(name, len(joints), total_mass, edits.gravity)
+    parts = heading, *_edits(dict(edits.lock), edits.payloads), *_other_edits(edits), *short_order(joints, file_order)
+    return f"<Robot: {'; '.join(parts)}>"
 
 
 def _heading(name: str, n: int, total_mass: float, gravity: tuple[float, float, float]) -> str:

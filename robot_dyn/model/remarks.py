@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 _TURN = 2 * np.pi
+_LISTED = 8  # largest number of joints that one line of a robot lists
 
 
 def no_torque(gravity: tuple[float, float, float]) -> str:
@@ -16,18 +17,30 @@ def no_torque(gravity: tuple[float, float, float]) -> str:
     return f"gravity {gravity} m/s² exerts no torque on any joint at any position, so N(q) = 0"
 
 
-def gravity_lines(gravity: tuple[float, float, float], free: tuple[str, ...], n: int) -> Iterator[str]:
-    """Yield a remark if gravity exerts no torque on some joints of n at any position."""
+def gravity_lines(
+    gravity: tuple[float, float, float], free: tuple[str, ...], balanced: tuple[str, ...], n: int
+) -> Iterator[str]:
+    """Yield remarks if gravity exerts no torque on some joints of n at any position, `balanced` in any mounting."""
     if len(free) == n:
         yield f"{no_torque(gravity)} without effects"
-    elif free:
-        yield f"gravity exerts no torque on {', '.join(free)} at any position, as the robot is mounted"
+        return
+    mounted = [name for name in free if name not in balanced]
+    for names, when in ((mounted, "as the robot is mounted"), (balanced, "in any mounting")):
+        if names:
+            yield f"gravity exerts no torque on {', '.join(names)} at any position, {when}"
 
 
 def order_lines(joints: tuple[str, ...], file_order: tuple[str, ...]) -> Iterator[str]:
     """Yield the order of q if the file has another order."""
     if joints != file_order:
         yield f"order of q: {', '.join(joints)}; the file has {', '.join(file_order)}: give a state by joint name"
+
+
+def short_order(joints: tuple[str, ...], file_order: tuple[str, ...]) -> Iterator[str]:
+    """Yield the order of q, without all names of a long one, if the file has another order."""
+    if joints != file_order:
+        more = f", … ({len(joints)} in joint_names)" if len(joints) > _LISTED else ""
+        yield f"order of q: {', '.join(joints[:_LISTED])}{more}; the file has another order"
 
 
 def degree_lines(

@@ -53,7 +53,7 @@ from robot_dyn.model.calls import Scratch
 from robot_dyn.model.conditioning import LEAST_DIGITS
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
-from robot_dyn.model.findings import findings_of
+from robot_dyn.model.findings import findings_of, zero_efforts
 from robot_dyn.model.from_pinocchio import described
 from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, robot_line
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
@@ -287,6 +287,12 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         """Doubtful values of the description and its edits, each with its remedy; see docs/reference/findings.md."""
         return findings_of(self.description, self.edits, self._evaluation.regularity)
 
+    @cached_property
+    def announced_findings(self) -> tuple[str, ...]:
+        """Findings that `load` warns of: all except effort limits of 0, which only comparisons of torques need."""
+        unannounced = {*zero_efforts(structure_of(self.description, self.edits))}
+        return tuple(finding for finding in self.findings if finding not in unannounced)
+
     @property
     def gravity_acts(self) -> bool:
         """True if gravity exerts a torque or force on a joint at some position."""
@@ -309,6 +315,15 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             return ()
         free = largest <= _ROUNDING * weight * length
         return tuple(name for name, is_free in zip(self.joint_names, free, strict=True) if is_free)
+
+    @cached_property
+    def balanced(self) -> tuple[str, ...]:
+        """Joints of `gravity_free` on which gravity exerts none in any mounting: their load is balanced about them."""
+        free = set(self.gravity_free)
+        for axis in np.eye(3) if free else ():
+            mounted = replace(self, edits=replace(self.edits, gravity=tuple(axis.tolist())), answer_check=None)
+            free &= set(mounted.gravity_free)
+        return tuple(name for name in self.joint_names if name in free)
 
     @cached_property
     def file_order(self) -> tuple[str, ...]:
@@ -362,8 +377,8 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return Robot(*described(model)).announced()
 
     def announced(self) -> Robot:
-        """Warn of the robot's findings, and return it with warnings of its queries if M is nearly singular."""
-        announce(self.name, self.findings)
+        """Warn of `announced_findings`, and return the robot with warnings of its queries if M is nearly singular."""
+        announce(self.name, self.announced_findings, len(self.findings))
         regularity = self._evaluation.regularity
         if regularity.singular or not regularity.near:
             return self
@@ -416,7 +431,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return write_urdf(self.description, self.edits, path)
 
     def __repr__(self) -> str:
-        return robot_line(self.name, self.n, self.total_mass, self.edits)
+        return robot_line(self.name, self.joint_names, self.file_order, self.total_mass, self.edits)
 
     def _repr_html_(self) -> str:
         return info(self)._repr_html_()
@@ -517,6 +532,7 @@ def info(robot: Robot) -> Info:
         gravity=robot.edits.gravity,
         gravity_acts=robot.gravity_acts,
         gravity_free=robot.gravity_free,
+        balanced=robot.balanced,
         file_order=robot.file_order,
         joints=tuple(Joint(*row) for row in rows),
         couplings=tuple(couplings_of(robot.description, set(robot.model.names[1:]))),

@@ -16,7 +16,18 @@ from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.messages import part
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, one_of, per_joint
+from robot_dyn.scene.schema import (
+    NotNegative,
+    Number,
+    Part,
+    PerJoint,
+    Point,
+    Positive,
+    Truth,
+    Vector3,
+    one_of,
+    per_joint,
+)
 
 
 class Reference(Part):
@@ -64,8 +75,8 @@ class ViaPoints(Reference):
     kind: Literal["via_points"]
     times_s: tuple[Positive, ...] = ()
     """Time of each point."""
-    points: tuple[list[Number], ...] = ()
-    """Position at each time, a list of n numbers, in rad, or m for a prismatic joint."""
+    points: tuple[Point, ...] = ()
+    """Position at each time, in rad, or m for a prismatic joint."""
     file: str | None = None
     """Path of a CSV file with columns t and one for each joint, relative to the folder of the scene."""
     joints: dict[str, str] | None = None
@@ -89,7 +100,7 @@ class ViaPoints(Reference):
         if (self.file is None) != bool(self.times_s or self.points):
             raise SceneError("reference: give times_s and points, or a file of both")
         if self.file is None:
-            return list(self.times_s), list(self.points)
+            return list(self.times_s), [per_joint("points", point, robot).tolist() for point in self.points]
         table = recorded(robot, self.file, joints=self.joints, unit=self.unit, least=1)
         refuse_other_units(table)
         if table.more:

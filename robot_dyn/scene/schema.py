@@ -96,6 +96,10 @@ Truth = Annotated[bool, Field(strict=True)]
 Vector3 = Annotated[tuple[Number, Number, Number], Form("a list of 3 finite numbers", "list of 3 numbers")]
 _BY_JOINT = "a finite number, a list of them or a table of them by joint"  # a joint left out of a table has 0
 PerJoint = Annotated[Number | list[Number] | dict[str, Number], Form(_BY_JOINT, "by joint")]
+Point = Annotated[
+    list[Number] | dict[str, Number],
+    Form("a list of finite numbers or a table of them by joint", "row of n numbers or by joint"),
+]
 Stated = Annotated[
     Number | list[Number] | dict[str, Number] | Literal["urdf", "urdf_soft"],
     Form(f"{_BY_JOINT}, or 'urdf'", 'by joint or `"urdf"`'),

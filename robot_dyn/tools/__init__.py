@@ -1,6 +1,7 @@
 """Tools: separate products, which use the library as a user would.
 
     doctor   faults of a URDF file, and repairs
+    identify parameters of an arm from its motion, and motions that show them
     motors   plans, and whether the motors suffice for them
     sweeps   many runs of a scene under uncertain parameters
     proof    theorems about where an arm will be

@@ -20,7 +20,7 @@ _draw = MachineFunction(draw, INSTEAD, lambda: None, "").calls()
 
 def deviates(seed: int, run: int, ticks: int, channels: int) -> np.ndarray:
     """By the function of the loop, (ticks, channels)."""
-    made, keys = np.zeros((channels, 1)), np.array([[seed], [run]], dtype=np.uint64)
+    made, keys = np.zeros((channels, 1)), np.array([[seed], [run], [0]], dtype=np.uint64)
     rows = []
     for tick in range(ticks):
         _draw(made, 0, channels, keys, tick)
@@ -50,7 +50,7 @@ def test_deviates_are_the_inverse_of_the_normal_distribution() -> None:
 
 
 def test_machine_code_draws_the_same_bits() -> None:
-    keys = np.array([[3, 3, 2**63], [0, 1, 9]], dtype=np.uint64)
+    keys = np.array([[3, 3, 2**63], [0, 1, 9], [0, 5, 2**62]], dtype=np.uint64)
     one, two = np.zeros((9, 3)), np.zeros((9, 3))
     for tick in (0, 1, 1000, 2**40):
         with np.errstate(over="ignore"):

@@ -209,8 +209,24 @@ def test_names_of_legs_wheels_and_rotors_on_two_branches_tell_a_mobile_base(
 
 def no_effort(tmp_path: Path) -> rd.Robot:
     (tmp_path / "arm.urdf").write_text(altered((LIMIT, LIMIT.replace('effort="9"', 'effort="0"'))))
-    with pytest.warns(ModelWarning, match="the effort limit is 0"):
-        return rd.load(tmp_path / "arm.urdf")
+    return rd.load(tmp_path / "arm.urdf")
+
+
+def test_an_effort_limit_of_zero_is_a_finding_without_a_warning(tmp_path: Path) -> None:
+    """M, C, N and runs do not depend on it, and often motors.csv or the user states it: warnings are errors here.
+
+    The finding stays in `info`, `Robot.findings` and the doctor. A velocity limit of 0 next to it warns alone.
+    """
+    robot = no_effort(tmp_path)
+    assert len(robot.findings) == len(rd.info(robot).findings) == 1 and robot.announced_findings == ()
+    checkup = rd.tools.doctor.check_urdf(tmp_path / "arm.urdf")
+    assert [(x.kind, x.where) for x in checkup.findings if x.kind == "limit_zero"] == [
+        ("limit_zero", "joint 'shoulder'")
+    ]
+    with pytest.warns(ModelWarning) as caught:
+        both = rd.Robot.from_text(altered((LIMIT, LIMIT.replace('effort="9" velocity="2"', 'effort="0" velocity="0"'))))
+    assert len(caught) == 1 and len(both.findings) == 2 and both.announced_findings == both.findings[1:]
+    assert not any(finding in robot.findings for finding in rd.compare(robot, samples=1).notes)
 
 
 def test_an_effort_limit_of_zero_in_the_file_never_drops_the_arm_in_silence(tmp_path: Path) -> None:

@@ -110,6 +110,54 @@ def test_gravity_exerts_no_torque_about_its_direction_nor_force_across_it() -> N
     assert any("along" in line for line in plant_state(table, [0, 0], [0, 0], [0, 0]).remarks)
 
 
+BALANCED = LINK.format(mass=2.0).replace('"0.3 0 0"', '"0 0 0"')  # the centre of mass on the axis of its joint
+
+
+@pytest.mark.parametrize(
+    ("parts", "mounted", "balanced"),
+    [
+        ((joint("pan", "base", "l1", "0 0 1"), link("l1", 2.0)), ("pan",), ()),  # vertical: loaded on a wall
+        ((joint("spin", "base", "l1", "0 1 0"), f'<link name="l1">{BALANCED}</link>'), (), ("spin",)),
+        ((joint("x", "base", "l1", "1 0 0", "prismatic"), link("l1", 2.0)), ("x",), ()),
+        # a balanced wheel on a vertical column
+        (
+            (joint("pan", "base", "l1", "0 0 1"), link("l1", 2.0), joint("wheel", "l1", "l2", "0 1 0"),
+             f'<link name="l2">{BALANCED}</link>'),
+            ("pan",), ("wheel",),
+        ),
+        # a wheel with a weight at its rim
+        (
+            (joint("wheel", "base", "l1", "0 1 0"), f'<link name="l1">{BALANCED}</link>',
+             '<joint name="rim" type="fixed"><parent link="l1"/><child link="l2"/></joint>', link("l2", 0.1)),
+            (), (),
+        ),
+        ((joint("roll", "base", "l1", "1 0 0"), link("l1", 2.0)), (), ("roll",)),  # the centre of mass along the axis
+    ],
+)  # fmt: skip
+def test_a_balanced_joint_is_free_of_gravity_in_every_mounting(
+    parts: tuple[str, ...], mounted: tuple[str, ...], balanced: tuple[str, ...]
+) -> None:
+    """ω · (c × m g) = 0 for all g if and only if c lies on the axis."""
+    arm = robot(*parts)
+    assert arm.balanced == rd.info(arm).balanced == balanced
+    assert set(arm.gravity_free) == {*mounted, *balanced}
+    for gravity in ((9.81, 0.0, 0.0), (0.0, -9.81, 0.0), (1.0, 2.0, 3.0)):
+        turned = rd.Robot(arm.description, arm.edits.with_(arm.joint_names, gravity=gravity))
+        assert turned.balanced == balanced
+    remarks = plant_state(arm, np.zeros(arm.n), np.zeros(arm.n), np.zeros(arm.n)).remarks
+    assert len(remarks) == (bool(mounted) + bool(balanced) if len(arm.gravity_free) < arm.n else 1)
+
+
+def test_the_order_of_q_is_part_of_the_line_of_a_robot() -> None:
+    assert "shoulder_a, shoulder_b" in repr(TWO) and "\n" not in repr(TWO)
+    assert "order of q" not in repr(rd.load("ur5"))
+
+
+@pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
+def test_the_line_of_a_robot_of_many_joints_is_short() -> None:
+    assert len(repr(rd.load("talos_full_v2"))) < 400
+
+
 def test_a_light_finger_on_a_heavy_arm_feels_gravity() -> None:
     """1 µg at 0.3 m below 1500 kg: a torque of 3e-9 N m, 1e-12 of that at the shoulder, is no rounding error."""
     arm = robot(

@@ -15,7 +15,7 @@ from robot_dyn import Setup
 from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.foundations import FLOAT64, MachineCodeError
-from robot_dyn.integrate import FIXED_STEP, PlainMethod, Stepper, method
+from robot_dyn.integrate import FIXED_STEP, FixedStepper, PlainMethod, method
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation import StateEquation, machine_code, observation_of, segment_table
@@ -274,7 +274,7 @@ class Heun(PlainMethod):
     evaluations_per_step = 2
 
     def stepper(self, kind, m, n, rows, runs=1, widths=None):
-        return Stepper(self.of, Weights(0.5), Work(np.zeros((2, rows, runs), kind.dtype)))
+        return FixedStepper(self.of, Weights(0.5), Work(np.zeros((2, rows, runs), kind.dtype)))
 
 
 def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -> None:

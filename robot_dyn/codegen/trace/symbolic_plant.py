@@ -60,7 +60,8 @@ def symbolic_controller(
     parts: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
     remaining = iter(pieces)
     for name, reference in controller.references.items():
-        if isinstance(reference, PiecewisePolynomial) and type(reference).at is not PiecewisePolynomial.at:
+        whole = reference.polynomials.get("")
+        if whole is not None and type(whole).at is not PiecewisePolynomial.at:
             raise TraceError(
                 f"reference {type(reference).__name__} cannot be compiled: its at(t) differs from its polynomials;"
                 " use an rd.control.PiecewisePolynomial, or engine='interpreted'"

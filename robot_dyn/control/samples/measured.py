@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from robot_dyn.control.samples.sources import Source
+    from robot_dyn.foundations.validate import JointValues
 
 
 _ROUNDED = 0.01  # fraction of the time between two samples: larger rounding of the times raises an error
@@ -36,7 +37,7 @@ def from_samples(
     joints: Mapping[str, str] | None = None,
     unit: str | None = None,
     ends: str | None = None,
-    q0: ArrayLike | None = None,
+    q0: JointValues | None = None,
     start_s: float | None = None,
     topic: str | None = None,
 ) -> Plan:
@@ -66,7 +67,8 @@ def from_samples(
         ends: "rest", with zero velocity and acceleration at both ends; or "measured", with the velocities and
             accelerations of a run's table if it has them, else not-a-knot. By default "rest", which is an error if 16
             or more samples move there.
-        q0: Rest positions of joints without a column, (n,), in [rad] or [m]; by default each joint needs a column.
+        q0: Rest positions of joints without a column, (n,) or by joint name, in [rad] or [m]; by default each joint
+            needs a column.
         start_s: Time of the first sample, in [s]; by default unchanged.
         topic: Topic of a log; by default its only topic of joint states, or "/joint_states".
 

@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.control.samples.sources import table_of
 from robot_dyn.control.samples.table import TIME_NAMES, Table, is_text, name_of, size, unit_of
 from robot_dyn.foundations.errors import PlanError, nearest, shown
-from robot_dyn.foundations.validate import choice, instance, number, numbers
+from robot_dyn.foundations.validate import choice, in_order, instance, number, numbers
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from robot_dyn.control.samples.sources import Source
+    from robot_dyn.foundations.validate import JointValues
 
 
 # headings other than t and q in the table of a run
@@ -83,7 +84,7 @@ def recorded(
     time: ArrayLike | None = None,
     joints: Mapping[str, str] | None = None,
     unit: str | None = None,
-    q0: ArrayLike | None = None,
+    q0: JointValues | None = None,
     topic: str | None = None,
     least: int = 2,
 ) -> Recorded:
@@ -101,7 +102,7 @@ def recorded(
     if absent and (q0 is None or not at):
         names, rest = ("any joint", "") if q0 is not None else (", ".join(absent), ", or give its rest position in q0")
         raise PlanError(f"there is no column of {names}; {nearest(absent[0], heads)}; name it by {_NAME_JOINTS}{rest}")
-    rests = np.zeros(arm.n) if q0 is None else numbers("q0", q0, (arm.n,), error=PlanError)
+    rests = np.zeros(arm.n) if q0 is None else _rests(arm, q0)
     q, stated = np.tile(rests, (len(t), 1)), np.ones(arm.n, bool)
     for i, (name, kind) in enumerate(zip(arm.joint_names, arm.joint_types, strict=True)):
         if (head := at.get(name)) is not None:
@@ -116,6 +117,11 @@ def recorded(
     more = {} if joints is not None else _rates(arm, heads, unit)
     has_column = np.array([name in at for name in arm.joint_names])
     return Recorded(arm, t, q, stated, has_column, has_time_unit, more, note)
+
+
+def _rests(arm: Robot, q0: JointValues) -> np.ndarray:
+    """Return the rest positions of joints without a column, (n,)."""
+    return numbers("q0", in_order("q0", q0, arm.joint_names, error=PlanError), (arm.n,), error=PlanError)
 
 
 def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:

@@ -33,7 +33,8 @@ class Fastest:
     Attributes:
         eigenvalue: λ, in [1/s].
         joint: Name of the joint with the largest part in the motion.
-        source: Name of the effect or control with the largest |λ_k|; BODIES if the rigid bodies contribute most.
+        source: Name of the effect or control with the largest |λ_k|; "the motion of the bodies" if they
+            contribute most.
     """
 
     eigenvalue: complex

@@ -139,7 +139,7 @@ class Lanes(NamedTuple):
         end_time, end_state: Time, in [s], and state at its end, (W,) and (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|, (W,).
         peak: Largest K at the energy checks, (W,).
-        keys: Seed and number of each run, which determine its noise, (2, W), as uint64.
+        keys: Seed, number and first tick of each run, which determine its noise, (3, W), as uint64.
     """
 
     y: Array
@@ -246,7 +246,7 @@ def lanes_of(
     seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
     start, after = aligned((2, m, W))
     start[...] = y
-    keys = np.empty((2, W), np.uint64)
+    keys = np.zeros((3, W), np.uint64)
     keys[0], keys[1] = seed, numbers
     keys[1] += np.uint64(run)
     rows = {"inner": m, "end_state": m, "sampled": sampled, "u": n, "energies": 2}

@@ -57,7 +57,7 @@ class DetectingWork(NamedTuple):
     """The arrays of a step in lock step.
 
     Attributes:
-        method: Arrays of the method, see `Stepper.work`.
+        method: Arrays of the method, see `FixedStepper.work`.
         K: Rates of the method, the latest last.
         events: The switching functions.
     """

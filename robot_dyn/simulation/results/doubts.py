@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import final
 
+from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.sentences import Part, Parts, sentence
 from robot_dyn.simulation.dynamics.fastest_motion import MOTION
 from robot_dyn.simulation.run.outcome import TOO_FAST
@@ -115,12 +116,12 @@ class Doubt:
     kind: DoubtKind
     facts: dict[str, float | str] = field(default_factory=dict, hash=False)
 
-    @property
+    @reported
     def text(self) -> str:
         """The doubt in a sentence, without its remedy."""
         return sentence(_SENTENCES[self.kind], self.facts)
 
-    @property
+    @reported
     def remedy(self) -> str:
         """The remedy; empty if there is none."""
         return sentence(_REMEDIES.get(self.kind, (_FINER,)), self.facts)

@@ -5,6 +5,7 @@ The period is the duration of a setup. Each call runs the same segments from tim
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from math import inf
 from typing import cast, final
@@ -52,6 +53,9 @@ class Periods:
             0 in (*program.outputs, *(x for op in program.ops for x in op.operands)) for program in programs
         )
         tiles = -(-len(batch) // LANES)
+        self._ticks = (
+            round(setup.duration_s / setup.controller.period_s) if setup.controller and equation.sampled else 0
+        )
         self._numbers = np.minimum(np.arange(tiles * LANES), len(batch) - 1)  # a tile that is not full repeats a run
         numbers = self._numbers.reshape(tiles, LANES)
         parameters = [code.run_parameters({name: x[row] for name, x in batch.sweep.items()}) for row in numbers]
@@ -65,10 +69,12 @@ class Periods:
         table = segment_table(setup)
         table.ticks[-1] = 0  # the next period begins with this tick
         assert code.machine_loop is not None
+        self._energy, self._p = code.in_python.energy, table.parameters[0]
+        self._keys = np.zeros((tiles, 3, LANES), np.uint64)
         self._workers = []
         for some in np.array_split(np.arange(tiles), min(threads, tiles)):  # each thread has its own work arrays
             stepper = cast(PlainMethod, setup.method).stepper(FLOAT64, equation.size, n, equation.size | 1, LANES)
-            lanes = lanes_of(equation, self._y[0], parameters[0], 0, table.parameters[0], numbers[0])
+            lanes = lanes_of(equation, self._y[0], parameters[0], 0, self._p, np.zeros(LANES, np.uint64))
             empty = np.empty((0, 0, LANES))
             records = records_of(
                 rows=np.zeros(0, np.int64), y=empty, sampled=empty, shared=np.empty((0, equation.size)),
@@ -77,9 +83,11 @@ class Periods:
             config = loop_config(equation, alone=False)._replace(largest=LARGEST)
             position, calls = start_position(inf), []
             for tile in some:
+                self._keys[tile] = lanes.keys
+                self._keys[tile, 1] += numbers[tile].astype(np.uint64)
                 runs = lanes._replace(
                     y=self._y[tile], run_parameters=self._parameters[tile],
-                    alive=self._alive[tile], reason=self._reason[tile],
+                    alive=self._alive[tile], reason=self._reason[tile], keys=self._keys[tile],
                 )  # fmt: skip
                 arguments = code.code.addresses, stepper.coefficients, stepper.work
                 loop = Loop(table, runs, records, config, position)
@@ -103,7 +111,7 @@ class Periods:
     @property
     def y(self) -> np.ndarray:
         """States of all runs, (B, m): q, v, states of the controller and of effects, works in the latest period."""
-        return self._y.transpose(0, 2, 1).reshape(-1, self._equation.size)[: self._count]
+        return self._y.transpose(0, 2, 1).copy().reshape(-1, self._equation.size)[: self._count]
 
     def write(self, runs: np.ndarray, y: np.ndarray, ended: np.ndarray) -> None:
         """Write states of some runs, (B,), from states y of all runs (B, m); `ended` is True for diverged runs."""
@@ -113,8 +121,21 @@ class Periods:
         self._alive[tile, column] = ~ended[run]
         self._reason[tile, column] = np.where(ended[run], LaneEnd.OVERFLOW, LaneEnd.RUNNING)
 
-    def advance(self, inputs: np.ndarray) -> None:
-        """Advance all runs by a period with these values of the parameter, (B, size)."""
+    def energies(self) -> np.ndarray:
+        """Return K + V of all runs, (B,), in [J]."""
+        both = np.zeros((len(self._y), 2, LANES))
+        for y, parameters, out in zip(self._y, self._parameters, both, strict=True):
+            cast(Callable[..., None], self._energy)(0.0, y, self._p, parameters, out)
+        return both.sum(axis=1).ravel()[: self._count]
+
+    def advance(self, inputs: np.ndarray, periods: np.ndarray) -> None:
+        """Advance all runs by a period.
+
+        Args:
+            inputs: Values of the parameter, (B, size).
+            periods: Number of periods since the start of each run, which selects its noise, (B,).
+        """
+        self._keys[:, 2] = (periods * self._ticks)[self._numbers].reshape(-1, LANES)
         rows = inputs if len(inputs) == len(self._numbers) else inputs[self._numbers]
         self._inputs[...] = rows.reshape(len(self._y), LANES, -1).transpose(0, 2, 1)
         self._y[:, self.work :] = 0.0

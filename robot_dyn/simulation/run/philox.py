@@ -54,12 +54,12 @@ def draw(y: Array, first: int, count: int, keys: Array, tick: int) -> None:
         y: States, (m, W).
         first: The first of these rows.
         count: Number of channels.
-        keys: Seed and number of each run, (2, W), as uint64.
-        tick: Number of the tick, from 0 on.
+        keys: Seed and number of each run, and number of its first tick, (3, W), as uint64.
+        tick: Number of the tick after the first one.
     """
     for b in range(y.shape[1]):
         for k in range(0, count, 4):
-            words = philox(_WORD(tick), _WORD(k // 4), keys[0, b], keys[1, b])
+            words = philox(_WORD(tick) + keys[2, b], _WORD(k // 4), keys[0, b], keys[1, b])
             for i in range(min(4, count - k)):
                 y[first + k + i, b] = normal(words[i])
 

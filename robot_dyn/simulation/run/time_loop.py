@@ -25,7 +25,7 @@ RUNAWAY = 1e3  # limit of the ledger's residual, relative to the energy at the s
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
-    """Return the time loop of a step function; see `Stepper`.
+    """Return the time loop of a step function; see `FixedStepper`.
 
     advance(functions, coefficients, work, loop, stop) → Ended. It returns early where Python must act, or after the
     current step if `stop[0]` is not 0; the next call continues at `loop.position`. The last segment is the end of the

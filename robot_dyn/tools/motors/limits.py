@@ -26,13 +26,13 @@ class Limits:
     """Limits of joints, each one number, by joint name or (n,), positive; inf for none.
 
     Attributes:
-        effort: Peak |τ|, in [N m] or [N].
+        effort: Peak |τ|, in [N m] or [N]; 0 for a passive joint.
         velocity: |q̇|, in [rad/s] or [m/s].
         acceleration: |q̈|, in [rad/s²] or [m/s²].
         continuous: Root mean square of τ, in [N m] or [N].
     """
 
-    effort: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
+    effort: Any = field(default=inf, metadata=coefficient("N m", least=0, infinite=True, elsewhere=inf))
     velocity: Any = field(default=inf, metadata=coefficient("rad/s", above=0, infinite=True, elsewhere=inf))
     acceleration: Any = field(default=inf, metadata=coefficient("rad/s^2", above=0, infinite=True, elsewhere=inf))
     continuous: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
@@ -88,11 +88,19 @@ def _stated(robot: Any, kind: str) -> Any:
     if zero := [
         name for name, limit in zip(robot.joint_names, np.broadcast_to(limits, robot.n), strict=True) if not limit
     ]:
+        listed = ", ".join(map(repr, zero[:6])) + (", …" if len(zero) > 6 else "")
+        passive = f", or {{{zero[0]!r}: 0}} for a passive joint" if kind == "effort" else ""
         raise PlanError(
-            f"the file states the {kind} limit 0 for {', '.join(map(repr, zero[:6]))}; give limits by joint,"
-            f" {kind}={{{zero[0]!r}: 10.0}}: joints left out have none"
+            f"the file states the {kind} limit 0 for {listed}; give limits by joint, {kind}={{{zero[0]!r}: 10.0}}"
+            f"{passive}: joints left out have none"
         )
     return limits
+
+
+def used_fraction(demand: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    """Return demands as fractions of limits; of a limit of 0, 0 for no demand and inf for any other."""
+    passive = np.where(np.asarray(demand) == 0, 0.0, inf)
+    return np.divide(demand, limit, out=passive, where=np.asarray(limit) != 0)
 
 
 def outside_positions(

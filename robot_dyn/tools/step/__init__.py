@@ -2,6 +2,7 @@
 
     Stepper      n lanes of one plant: reset, step, state, set_state
     State        time, q, v and other states of all lanes
+    VectorEnv    the lanes as environments of Gymnasium; Env: one lane (extra `gym`)
 
 docs/how_to/step_many_arms.md is an example; robot_dyn/tools/step/README.md lists the files of this folder.
 """

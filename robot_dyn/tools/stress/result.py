@@ -69,7 +69,7 @@ class WorstCase:
 
     @reported
     def is_worse_than_random(self) -> bool:
-        """Return True if the search found a worse state than all random ones."""
+        """True if the search found a worse state than all random ones."""
         return self.searched > self.random
 
 
@@ -176,7 +176,7 @@ class Stress(Result):
 
     @reported
     def failures(self) -> tuple[str, ...]:
-        """Return the failures of the library: refuted limits, and misleading runs."""
+        """Failures of the library: refuted limits, and misleading runs."""
         refuted = (limit for limit in self.limits if limit.confirmed is False)
         misleading = (run for run in self.runs if run.misleads)
         return (
@@ -186,12 +186,12 @@ class Stress(Result):
 
     @reported
     def ok(self) -> bool:
-        """Return True if there are no failures."""
+        """True if there are no failures."""
         return not self.failures
 
     @reported
     def sentence(self) -> str:
-        """Return the number of failures and the worst case of each kind, in one sentence."""
+        """Number of failures and the worst case of each kind, in one sentence."""
         parts = []
         for quantity in dict.fromkeys(case.quantity for case in self.worst):
             top = max((case for case in self.worst if case.quantity == quantity), key=lambda case: case.searched)

@@ -300,22 +300,22 @@ class SweepResult(Answer):
 
     @reported
     def status(self) -> dict[str, int]:
-        """Return the numbers of runs, chunks and missing chunks."""
+        """Numbers of runs, chunks and missing chunks."""
         return {"runs": self.sweep.runs, "chunks": self.folder.count, "missing": len(self.missing)}
 
     @reported
     def specification(self) -> dict[str, object]:
-        """Return the specification in the folder."""
+        """Contents of `specification.json` in the folder: setup, `vary`, `figures`, `design`, `seed`, versions."""
         return specification(self.sweep, self.folder.chunk).model_dump(mode="json")
 
     @reported
     def units(self) -> dict[str, str]:
-        """Return the units of columns that have one, by name."""
+        """Units of columns that have one, by name."""
         return self.sweep.units
 
     @reported
     def outcomes(self) -> dict[str, int] | None:
-        """Return the number of runs by outcome; None if chunks are missing."""
+        """Number of runs by outcome; None if chunks are missing."""
         if len(self.missing):
             return None
         outcome = self.folder.columns(("outcome",))["outcome"]
@@ -323,7 +323,7 @@ class SweepResult(Answer):
 
     @reported
     def remarks(self) -> dict[str, int] | None:
-        """Return the number of runs by remark, see `Rollouts.remarks`, by frequency; None if chunks are missing."""
+        """Number of runs by remark, see `Rollouts.remarks`, by frequency; None if chunks are missing."""
         if len(self.missing):
             return None
         count = Counter[str]()
@@ -333,12 +333,12 @@ class SweepResult(Answer):
 
     @reported
     def comparison(self) -> Comparison | None:
-        """Return how the figures of uncut runs differ from those of cut ones, for some runs; None if not compared."""
+        """Difference of cut from uncut runs, for some runs; None if the sweep is cut."""
         return self.folder.comparison() if self.sweep.uncut else None
 
     @reported
     def one_by_one(self) -> OneByOne:
-        """Return how many runs were made one by one, not in lock step, and how long that took."""
+        """Runs made one by one, not in lock step, and their time."""
         return self.folder.one_by_one()
 
     def reasons(self) -> dict[str, int]:

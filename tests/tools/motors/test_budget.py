@@ -18,10 +18,10 @@ from robot_dyn.foundations import EditError, EffectError, PlanError, QueryError
 from robot_dyn.tools.motors import budget, fastest, max_payload
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
 from robot_dyn.tools.motors.motor_budget.pace import least_pace
-from tests.cli.test_command_documents import PROMISE, names
 from tests.command import document, refusal
 from tests.command import run as ran
 from tests.long import long
+from tests.promised import check_document
 
 UR5 = rd.load("ur5")
 POINTS = np.array(  # pick, lift, carry, place
@@ -453,29 +453,18 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
 
 
 def test_the_document_of_the_command_has_the_keys_of_its_page(files: Path) -> None:
-    keys = promised_keys()
     found = document("budget", "ur5", files / "plan.csv", "--max-payload", "wrist_3_link@0.1,0,0.05")
-    assert found.keys() == keys.keys() - {"fastest"}
-    assert all(each.keys() == promised_keys(of_joints=True).keys() for each in found["joints"])
-    assert found["max_payload"].keys() == names(keys["max_payload"].partition(": ")[2])
+    check_document("budget", found, without=("fastest",))
     assert found["joints"][1]["headroom"].keys() == {"peak", "continuous", "speed"}
     own = max_payload(budget(rd.control.from_samples(UR5, files / "plan.csv"), UR5), "wrist_3_link", (0.1, 0.0, 0.05))
     assert found["max_payload"]["mass"] == pytest.approx(own.mass, rel=1e-12)
-
-
-def promised_keys(of_joints: bool = False) -> dict[str, str]:
-    """Meaning by key, of the table of the command, or of that of its joints."""
-    (section,) = [each for each in PROMISE.split("\n## ") if each.startswith("`robot-dyn budget")]
-    tables = section.split("Each of `joints`")
-    rows = [line.strip("| ").split(" | ", 1) for line in tables[of_joints].splitlines() if line.startswith("| `")]
-    return {key: meaning for keys, meaning in rows for key in names(keys)}
 
 
 @toppra
 def test_the_command_ends_with_1_if_the_fastest_motion_or_the_given_one_is_too_small(files: Path) -> None:
     """And its figure and table are those of the fastest one; its document has the keys of its page."""
     answer = document("budget", "ur5", files / "plan.csv", "--fastest")
-    assert answer["fastest"].keys() == names(promised_keys()["fastest"].partition(": ")[2])
+    check_document("budget", answer, without=("max_payload",))
     assert answer["fastest"]["budget"]["fits"] and answer["fastest"]["duration_s"] < answer["duration_s"]
     plan, motors = files / "plan.csv", files / "motors.csv"
     done = ran("budget", "ur5", plan, "--fastest", "--fraction", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
@@ -547,3 +536,54 @@ def test_a_verdict_of_many_lines_stands_above_the_axes_of_its_figure() -> None:
     headings = [*figure.texts, *figure.subfigs[0].texts]
     bottom = min(text.get_window_extent(renderer).y0 for text in headings)
     assert max(axes.get_tightbbox(renderer).y1 for axes in figure.axes) < bottom
+
+
+# --- passive joints
+
+TWO_BARS = rd.load("planar_2r")
+PASSIVE = {"joint_1": 20.0, "joint_2": 0.0}
+
+
+def test_the_budget_of_a_run_with_a_passive_joint_fits() -> None:
+    """The actuation of a joint without a motor is 0, which is no more than its limit of 0."""
+    plant = rd.Plant(TWO_BARS, [rd.effects.EffortLimit(PASSIVE), rd.effects.ViscousFriction(0.2)])
+    controller = rd.control.PD(rd.control.hold([0.4, 0.0]), kp=20.0, kd=5.0)
+    run = rd.simulate(plant, [0.3, 0.0], duration_s=0.4, controller=controller)
+    found = budget(run, effort=PASSIVE, velocity=50.0)
+    _, passive = found.joints
+    assert found.fits and (passive.peak, passive.peak_limit, passive.shares["peak"]) == (0.0, 0.0, 0.0)
+    assert "joint_2" not in found.verdict and found.to_json()
+
+
+def test_a_plan_that_needs_torque_of_a_passive_joint_does_not_fit() -> None:
+    found = budget(rd.control.quintic([0.1, 0.2], [0.3, 0.1], 1.0), TWO_BARS, effort=PASSIVE, velocity=50.0)
+    assert not found.fits and found.joints[1].too_small == ("peak",) and found.joints[1].shares["peak"] == np.inf
+    assert found.to_json() and "joint_2" in str(found)
+    assert max_payload(found, TWO_BARS.frame_names[-1]).mass is None
+
+
+def test_a_passive_joint_that_needs_no_torque_fits() -> None:
+    """A balanced load at rest, without gravity: 0 of 0."""
+    found = budget(rd.control.hold([0.3]), FREE, effort=0.0, velocity=1.0)
+    assert found.fits and found.joints[0].shares["peak"] == 0.0
+
+
+@toppra
+def test_no_path_is_planned_for_a_passive_joint() -> None:
+    with pytest.raises(PlanError, match="effort of joint 'joint_2' is 0"):
+        rd.tools.motors.path(TWO_BARS, [[0.1, 0.2], [0.3, 0.1]], effort=PASSIVE, velocity=3.0)
+
+
+def test_an_effort_limit_of_zero_is_refused_without_motors_and_not_mentioned_with_them(tmp_path: Path) -> None:
+    limit = '<limit effort="0" velocity="9"/><parent link="base"/>'
+    arm = rd.Robot.from_text(TWO_BARS.description.text.decode().replace('<parent link="base"/>', limit, 1))
+    motion = rd.control.quintic([0.1, 0.2], [0.3, 0.1], 1.0)
+    assert arm.findings and not arm.announced_findings
+    with pytest.raises(PlanError, match=r"effort limit 0 for 'joint_1'.*\{'joint_1': 0\} for a passive joint"):
+        budget(motion, arm)
+    (tmp_path / "motors.csv").write_text("joint,peak [N m],speed [rad/s]\njoint_1,200,9\njoint_2,60,9\n")
+    for stated in (
+        {"motors": rd.tools.motors.read_motors(tmp_path / "motors.csv")},
+        {"effort": 200.0, "velocity": 9.0},
+    ):
+        assert not any("effort limit" in finding for finding in budget(motion, arm, **stated).findings)

@@ -22,11 +22,11 @@ from robot_dyn.tools.stress.result import JudgedRun, WorstCase
 from robot_dyn.tools.stress.runs import FAMILIES, scenes
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, shrunk, worst, worst_configurations
-from tests.cli.test_command_documents import promised
 from tests.command import run
 from tests.hostile.kinds import AXIS, LIMIT
 from tests.hostile.kinds import arm as altered
 from tests.long import long
+from tests.promised import check_document
 from tests.short_stress import short_stress
 
 MORE = ("planar_2r", "cart_pole", "mimic_chain", "ur5")
@@ -385,11 +385,8 @@ def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monke
     done = run("stress", "pendulum", "--json", "-o", tmp_path / "found")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
-    parts = ("worst", "limits", "runs")
-    assert promised("stress").keys() == {
-        *document, *(key for part in parts for each in document[part] for key in each)
-    }  # fmt: skip
-    assert all(document[part] for part in parts)
+    check_document("stress", document)
+    assert all(document[part] for part in ("worst", "limits", "runs"))
     text = (tmp_path / "found.json").read_text(encoding="utf-8")
     assert json.loads(text) == document and str(tmp_path) not in text
     shown = run("stress", "pendulum")

@@ -119,7 +119,7 @@ def _of_plan(
         )
     limits, demand = limits_of(plant, motors, **given), of_motion(reference, plant)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
-    findings = [*robot.findings, *(() if plan is None else plan.findings), *outside]
+    findings = [*robot.announced_findings, *(() if plan is None else plan.findings), *outside]
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):
         findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(

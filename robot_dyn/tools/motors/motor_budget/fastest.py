@@ -62,7 +62,7 @@ class FastestMotion(Answer):
 
     @reported
     def duration_s(self) -> float:
-        """Return the duration of the motion, in [s]."""
+        """Duration of the motion, in [s]."""
         return self.plan.duration_s
 
     def blocks(self) -> Iterator[Block]:

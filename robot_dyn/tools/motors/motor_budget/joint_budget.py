@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.foundations import reported
 from robot_dyn.queries import of_joint
-from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.limits import Limits, used_fraction
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 
 TOLERANCE = 1e-3  # relative to a limit, by which plans at their limits may exceed it
@@ -37,7 +37,7 @@ class JointBudget:
         static_friction: f_s of dry friction, in [N m]; 0 without dry friction, nan for a run.
         breakaway, breakaway_at_s: Largest |τ| at which the joint leaves rest against f_s, and its time; nan if it never
             leaves rest.
-        peak_limit, continuous_limit, speed_limit: The limits; inf for none.
+        peak_limit, continuous_limit, speed_limit: The limits; inf for none, a peak limit of 0 for a passive joint.
         of_peak: Parts of τ at `peak_at_s` by cause.
         of_rms: Parts of `rms` by cause, 1/(T rms) ∫ τ_cause τ dt; negative for a cause that relieves the motor.
         cut: True if an effort limit cut the actuation of a run, so that the demand was higher.
@@ -69,17 +69,18 @@ class JointBudget:
     def shares(self) -> dict[str, float]:
         """Used fractions of the limits "peak", "continuous" and "speed"; 0 for unknown limits."""
         peak = max(self.peak, 0.0 if isnan(self.breakaway) else self.breakaway)
-        used = peak / self.peak_limit, self.rms / self.continuous_limit, self.speed / self.speed_limit
-        return dict(zip(KINDS, used, strict=True))
+        demand = np.array([peak, self.rms, self.speed])
+        limit = np.array([self.peak_limit, self.continuous_limit, self.speed_limit])
+        return dict(zip(KINDS, used_fraction(demand, limit).tolist(), strict=True))
 
     @reported
     def headroom(self) -> dict[str, float]:
-        """Return the unused fraction of each limit; 1 for unknown limits, negative for exceeded ones."""
+        """Unused fraction of each limit; 1 for unknown limits, negative for exceeded ones."""
         return {kind: 1 - used for kind, used in self.shares.items()}
 
     @reported
     def too_small(self) -> tuple[str, ...]:
-        """Return the limits that are exceeded by more than a thousandth: "peak", "continuous" or "speed".
+        """Limits that are exceeded by more than a thousandth: "peak", "continuous" or "speed".
 
         A peak torque at which the actuation was cut is included.
         """

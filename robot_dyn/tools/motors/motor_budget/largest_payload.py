@@ -21,7 +21,7 @@ import numpy as np
 from robot_dyn import Payload, Plant
 from robot_dyn.description import LARGEST
 from robot_dyn.foundations import Answer, Block, QueryError
-from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.limits import Limits, used_fraction
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
@@ -44,7 +44,7 @@ class LargestPayload(Answer):
         mass: The mass, in [kg], in addition to the arm's payloads; None if no mass fits, inf if no known limit bounds
             it.
         least: The smallest mass that fits, in [kg]: 0, unless the arm needs a counterweight.
-        joint: The limiting joint.
+        joint: The limiting joint; empty if no known limit bounds the mass.
         limit: The limit: "peak torque", "continuous torque", "break-away torque" or "speed".
         at_s: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion.
         largest_share: Largest share of a torque limit with this mass, by inverse dynamics.
@@ -201,5 +201,6 @@ def _of_means(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
 def _share(demand: Demand, limits: Limits) -> float:
     """Return the largest share of a torque limit."""
     rms = np.sqrt(demand.mean(demand.split.tau**2))
-    broken = np.abs(demand.starts.torque) / limits.effort[demand.starts.joint]
-    return float(max((demand.peak / limits.effort).max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))
+    broken = used_fraction(np.abs(demand.starts.torque), limits.effort[demand.starts.joint])
+    peak = used_fraction(demand.peak, limits.effort)
+    return float(max(peak.max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))

@@ -55,12 +55,12 @@ class MotorBudget(Result):
 
     @reported
     def fits(self) -> bool:
-        """Return True if no known limit is exceeded."""
+        """True if no known limit is exceeded."""
         return not any(joint.too_small for joint in self.joints)
 
     @reported
     def sentence(self) -> str:
-        """Return the verdict on the motors, in one sentence."""
+        """Verdict on the motors, in one sentence."""
         return f"{self.robot}, {self.motion}: {self.verdict}"
 
     @property

@@ -11,10 +11,9 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn.control import PiecewisePolynomial, polynomial
-from robot_dyn.foundations import PlanError
+from robot_dyn.foundations import JointValues, PlanError, in_order
 from robot_dyn.foundations import numbers as checked_numbers
 
 _MOST_POINTS = 2000
@@ -25,7 +24,7 @@ _FARTHEST = 1e100  # [rad] or [m]: squares do not overflow
 numbers = partial(checked_numbers, error=PlanError)
 
 
-def geometric_path(source: PiecewisePolynomial | ArrayLike, joint_names: tuple[str, ...]) -> PiecewisePolynomial:
+def geometric_path(source: PiecewisePolynomial | JointValues, joint_names: tuple[str, ...]) -> PiecewisePolynomial:
     """Return the path through way points, (m, n), or the path of a piecewise polynomial.
 
     Raises:
@@ -33,7 +32,7 @@ def geometric_path(source: PiecewisePolynomial | ArrayLike, joint_names: tuple[s
     """
     n = len(joint_names)
     if not isinstance(source, PiecewisePolynomial):
-        return through(numbers("points", source, ("m", n)))
+        return through(numbers("points", in_order("points", source, joint_names, error=PlanError), ("m", n)))
     if source.n != n:
         raise PlanError(f"the path has {source.n} joints, the arm has {n}; give a path of {n} joints")
     path, (first, last) = at_rest_exactly(source), source.breaks[[0, -1]]

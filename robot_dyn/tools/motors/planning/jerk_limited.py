@@ -8,14 +8,14 @@ target states, 2021]
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robot_dyn import Robot
 from robot_dyn.control import PiecewisePolynomial, Plan
-from robot_dyn.foundations import PlanError, instance, needs, number, numbers, one_state
+from robot_dyn.foundations import JointValues, PlanError, in_order, instance, needs, number, numbers, one_state
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import outside_positions
 
@@ -27,14 +27,14 @@ _Segment = tuple[float, ...]  # of one joint: start time, position, velocity, ac
 
 def point_to_point(
     arm: Robot,
-    q0: ArrayLike,
-    q1: ArrayLike,
+    q0: JointValues,
+    q1: JointValues,
     *,
-    acceleration: ArrayLike,
-    jerk: ArrayLike,
-    velocity: ArrayLike | None = None,
-    v0: ArrayLike = 0.0,
-    v1: ArrayLike = 0.0,
+    acceleration: JointValues,
+    jerk: JointValues,
+    velocity: JointValues | None = None,
+    v0: JointValues = 0.0,
+    v1: JointValues = 0.0,
     start_s: float = 0.0,
 ) -> Plan:
     """Plan the fastest motion from q0 to q1 under limits of velocity, acceleration and jerk.
@@ -44,7 +44,8 @@ def point_to_point(
 
     Args:
         arm: The robot.
-        q0: Position at the start, (n,), in [rad] or [m] by joint.
+        q0: Position at the start, (n,), in [rad] or [m] by joint; like all values of joints, also by joint name, where
+            joints left out have 0, and no limit.
         q1: Position at the end, (n,), in [rad] or [m] by joint.
         acceleration: Largest acceleration, a scalar or (n,), in [rad/s²] or [m/s²].
         jerk: Largest jerk, a scalar or (n,), in [rad/s³] or [m/s³]; inf for no limit: the acceleration then jumps.
@@ -59,13 +60,13 @@ def point_to_point(
             the robot; the message names joint, time and value.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
-    start_s, shape = number("start_s", start_s, error=PlanError), (arm.n,)
+    start_s = number("start_s", start_s, error=PlanError)
     ends = [one_state(name, x, arm.joint_names) for name, x in (("q0", q0), ("q1", q1))]
-    rates = [_of_joints(name, v, shape) for name, v in (("v0", v0), ("v1", v1))]
+    rates = [_of_joints(arm, name, v) for name, v in (("v0", v0), ("v1", v1))]
     limits = {
-        "velocity": arm.velocity_limit if velocity is None else _of_joints("velocity", velocity, shape, limit=True),
-        "acceleration": _of_joints("acceleration", acceleration, shape, limit=True),
-        "jerk": _of_joints("jerk", jerk, shape, limit=True),
+        "velocity": arm.velocity_limit if velocity is None else _of_joints(arm, "velocity", velocity, limit=True),
+        "acceleration": _of_joints(arm, "acceleration", acceleration, limit=True),
+        "jerk": _of_joints(arm, "jerk", jerk, limit=True),
     }
     if np.isinf(limits["acceleration"]).any():
         raise PlanError("acceleration must be finite; give the largest acceleration of each joint")
@@ -76,9 +77,10 @@ def point_to_point(
     return Plan(arm.name, arm.joint_names, arm.joint_types, reference, "from point to point, by ruckig", limits)
 
 
-def _of_joints(name: str, values: Any, shape: tuple[int], *, limit: bool = False) -> np.ndarray:
+def _of_joints(arm: Robot, name: str, values: Any, *, limit: bool = False) -> np.ndarray:
     """Return one number for all joints, or one for each, as (n,); limits are positive and may be infinite."""
-    above = 0.0 if limit else None
+    above, elsewhere, shape = (0.0, inf, (arm.n,)) if limit else (None, 0.0, (arm.n,))
+    values = in_order(name, values, arm.joint_names, elsewhere=elsewhere, error=PlanError)
     return np.broadcast_to(numbers(name, values, (), shape, error=PlanError, above=above, infinite=limit), shape)
 
 

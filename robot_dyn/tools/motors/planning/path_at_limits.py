@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, Plan, hold
-from robot_dyn.foundations import PlanError, number
+from robot_dyn.foundations import JointValues, PlanError, number
 from robot_dyn.tools.motors.limits import Limits, check_motors, limits_of
 from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.geometric_path import geometric_path, in_time, turning_points
@@ -41,7 +41,7 @@ _EXPECTED = 1.0, 0.2, 5.0, 0.04, 25.0  # factors on the expected duration: toppr
 
 def path(
     plant: Any,
-    points: Any,
+    points: JointValues | PiecewisePolynomial,
     *,
     fraction: float = 1.0,
     effort: Any = None,
@@ -59,8 +59,8 @@ def path(
 
     Args:
         plant: A plant or an arm.
-        points: Way points, (m, n), in [rad] or [m], joined by a natural cubic spline; or a
-            `rd.control.PiecewisePolynomial`, whose timing is ignored.
+        points: Way points, (m, n), in [rad] or [m], joined by a natural cubic spline; also a list of points by joint
+            name, 0 for joints left out; or a `rd.control.PiecewisePolynomial`, whose timing is ignored.
         fraction: Fraction of the effort limits that the motion may use, up to 1.
         effort: Effort limits, one number, by joint name or (n,), in [N m] or [N]; by default the limits of the motors
             or, without motors, of the robot's file.

@@ -1,0 +1,9 @@
+# The public names of this tool and where they live: type checkers read this file, and __init__.py does.
+from robot_dyn.tools.identify.excitation import Excitation as Excitation
+from robot_dyn.tools.identify.excitation import excite as excite
+from robot_dyn.tools.identify.information import ExpectedPrecision as ExpectedPrecision
+from robot_dyn.tools.identify.rest_poses import Poses as Poses
+from robot_dyn.tools.identify.rest_poses import StaticEstimate as StaticEstimate
+from robot_dyn.tools.identify.rest_poses import static as static
+
+__all__: list[str]
