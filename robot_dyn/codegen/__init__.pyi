@@ -11,6 +11,7 @@ from robot_dyn.codegen.primitives import INSTEAD as INSTEAD
 from robot_dyn.codegen.program import Kind as Kind
 from robot_dyn.codegen.program import Op as Op
 from robot_dyn.codegen.program import Program as Program
+from robot_dyn.codegen.program import Programs as Programs
 from robot_dyn.codegen.self_check import SelfCheckError as SelfCheckError
 from robot_dyn.codegen.store.cache import CacheWarning as CacheWarning
 from robot_dyn.codegen.store.cache import Store as Store

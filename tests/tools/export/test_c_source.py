@@ -23,7 +23,7 @@ from robot_dyn.tools.export import CSource, c_source
 from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
-from tests.cli.test_command_documents import promised
+from  import promised
 from tests.command import run
 from tests.long import long
 from tests.tools.export.c_program import HOST, TARGETS, WRITABLE, call, library, self_test, symbols

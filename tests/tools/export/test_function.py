@@ -9,8 +9,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import ExportError, QueryError
 from robot_dyn.tools import export
-from robot_dyn.tools.export.equations import QUANTITIES
 
+QUANTITIES = "M", "C", "N", "inverse_dynamics", "forward_dynamics"
 ARM = rd.load("cart_pole")
 PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction([0.3, 0.2]), rd.effects.RegularisedCoulombFriction(0.4)])
 Q, V, U = np.array([[0.3, -0.4], [0.7, 1.1], [1.3, 0.9]])
