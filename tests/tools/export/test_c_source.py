@@ -23,9 +23,9 @@ from robot_dyn.tools.export import CSource, c_source
 from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
-from  import promised
 from tests.command import run
 from tests.long import long
+from tests.promised import check_document
 from tests.tools.export.c_program import HOST, TARGETS, WRITABLE, call, library, self_test, symbols
 
 QUICK = (  # a fifth of the catalog: chains, trees, slides, coupled joints
@@ -373,8 +373,7 @@ def test_the_command_writes_the_files_and_prints_the_table(tmp_path: Path) -> No
     assert done.returncode == 0, done.stderr
     assert "inverse" not in done.stdout and "\nN " in done.stdout and done.stderr.count("written") == 4
     again = run("export-c", scene, "-o", tmp_path / "out", "--quantities", "N", "--force", "--json")
-    shown = json.loads(again.stdout)
-    assert shown.keys() | shown["functions"][0].keys() == promised("export-c").keys()
+    check_document("export-c", json.loads(again.stdout))
     assert "PLANAR_2R_P_VISCOUS_FRICTION_VISCOUS" in (tmp_path / "out" / "planar_2r_dynamics.h").read_text()
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "planar_2r_dynamics.h", "planar_2r_dynamics.c", "planar_2r_self_test.c", "CMakeLists.txt",
