@@ -22,7 +22,7 @@ from robot_dyn.view.web.text import page_text
 if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
 
-_HEIGHT = 720  # of a frame in a notebook, in pixels
+_HEIGHT = 720  # height of a page in a notebook, in pixels
 PAGE = FileKind("a page", ".html", b"<!DOCTYPE html>")
 
 
@@ -97,7 +97,7 @@ class Page:
             path: The file.
             fps: Frames per second, 1 to 240, or to 50 for a .gif. Default 60 for an .mp4, 25 for a .gif.
             size: Width and height in pixels, even numbers from 160 to 3840.
-            dark: Whether it is drawn for dark screens.
+            dark: True to draw it for dark screens.
             browser: Path of the browser; the first of this machine if not given.
             on_progress: Called with the finished part, 0 to 1, and the name of the work, in another thread.
 

@@ -95,7 +95,7 @@ _SENTENCES: Mapping[DoubtKind, Parts] = {
         "and none of them may depend on time",
     ),
 }
-_REMEDIES: Mapping[DoubtKind, Parts] = {  # of the other kinds, a smaller step or tolerance if the facts name one
+_REMEDIES: Mapping[DoubtKind, Parts] = {  # other kinds: a smaller step or tolerance, if the facts name one
     DoubtKind.NO_ORDER_OF_IMPACTS: ("compare it with step_s / 4, or with method='DOP853'",),
     DoubtKind.OSCILLATION_DAMPED: ("take shorter steps",),
     DoubtKind.ROUNDING: ("take a shorter run",),
@@ -108,7 +108,7 @@ class Doubt:
     """A doubt about the accuracy of a run.
 
     Attributes:
-        kind: Its subject.
+        kind: Subject of the doubt.
         facts: Numbers and names of its sentence, by name. With `smaller_step_s`, in [s], or `smaller_rtol`, a run with
             that setting is the remedy.
     """

@@ -22,7 +22,7 @@ _QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may contain colons and sem
 _SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)
 _NOTHING = 1e-9  # relative to the largest moment
 _LOST = 1e-6  # relative to the heaviest link and to the largest moment
-_RATIO = 1e4  # of two masses in an arm, for example a base of 100 kg and a finger of 10 g
+_RATIO = 1e4  # largest ratio of two masses in an arm, for example a base of 100 kg and a finger of 10 g
 _KINDS = (
     (Severity.ERROR, FindingKind.INERTIA_IMPOSSIBLE, doctor.impossible_inertias),
     (Severity.WARNING, FindingKind.INERTIA_WITHOUT_MASS, doctor.moments_without_mass),

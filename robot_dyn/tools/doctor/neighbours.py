@@ -139,7 +139,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
 
     Args:
         document: The file.
-        stated: Its structure.
+        stated: Structure of the robot.
         volumes: Volume of the shapes of each link, in [m³].
     """
     mass_of = {joint: sum(stated.links[name].mass for name in links) for joint, links in stated.bodies.items()}

@@ -14,7 +14,7 @@ from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 from robot_dyn.tools.doctor.kinds import FindingKind
 
 _SHAPES = {"box": {"size"}, "cylinder": {"radius", "length"}, "sphere": {"radius"}, "mesh": {"filename", "scale"}}
-CHILDREN: dict[str, set[str]] = {  # of URDF, with extensions of ROS, Gazebo and Drake
+CHILDREN: dict[str, set[str]] = {  # children in URDF, with extensions of ROS, Gazebo and Drake
     "link": {"inertial", "visual", "collision", "self_collision_checking", "contact", "verbose"},
     "joint": {"origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller"},
     "inertial": {"origin", "mass", "inertia"},
