@@ -146,7 +146,7 @@ class _ToStderr(logging.Handler):
 
 @contextmanager
 def logged_to_stderr() -> Iterator[None]:
-    """Write what the library logs, such as long waits, to standard error during a block."""
+    """Write messages of the library, such as long waits, to standard error during a block."""
     log, handler = logging.getLogger("robot_dyn"), _ToStderr()
     level, propagates = log.level, log.propagate
     log.setLevel(logging.INFO)

@@ -174,7 +174,7 @@ class _Document:
     """The common part of documents of runs and of robots: a scene to which robots are added, and notes."""
 
     def __init__(self, points: np.ndarray, robot: Robot, inertia: bool) -> None:
-        """Begin the scene of points (k, 3) in the base of the first robot, whose gravity points down."""
+        """Start the scene of points (k, 3) in the base of the first robot, whose gravity points down."""
         self._gravity, self._shows_boxes = robot.edits.gravity, inertia
         self._turn = upright(self._gravity)
         self.scenery = scenery(points @ self._turn.T)

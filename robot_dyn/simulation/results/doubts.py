@@ -1,7 +1,8 @@
-"""Doubts about the accuracy of a run are rows of numbers and names; the one table of this file words them.
+"""Doubts about the accuracy of a run: rows of numbers and names, and the table of their sentences.
 
 A doubt is the reason why an error estimate ends before its run, why it shows no order, or why the energy ledger does
-not close. A kind more: a member of `DoubtKind`, and a row of `_SENTENCES`.
+not close. To add a kind, add a member to `DoubtKind` and a row
+to `_SENTENCES`.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class Panel:
     every: int = 1
 
     def tall(self, height: float) -> float:
-        """Return its approximate height, in [mm], with rows of a given height."""
+        """Return the approximate height of the sheet, in [mm], with rows of a given height."""
         return _HEADING + height * len(self.rows)
 
 
