@@ -39,7 +39,8 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 RESULTS = {
     "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation", "ExpectedPrecision",
     "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "Stress", "SweepResult",
+    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "StaticEstimate", "Stress",
+    "SweepResult",
     "Trajectory", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
@@ -141,6 +142,7 @@ def examples(folder: Path) -> dict[str, Example]:
     motors.write_text("joint,peak [N m]\nslide,50\n")
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
     excited = rd.tools.identify.excite(robot, 5.0, limits={"velocity": 2.0}, starts=1, compare_longer=False)
+    states = np.random.default_rng(0).uniform(-1, 1, (12, 2))
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
     arms = rd.tools.step.Stepper(plant, 2)
@@ -285,6 +287,9 @@ def examples(folder: Path) -> dict[str, Example]:
             width_mm=120.0),
         call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
             tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),
+        call(rd.tools.identify.Poses, q=states, tau=states, approach=np.ones((12, 2))),
+        call(rd.tools.identify.static, arm=robot, poses=rd.tools.identify.Poses(states, robot.N(states)), friction=0.5,
+            noise=0.1, tilt=False),
         call(excited.save, path=folder / "excitation.csv"),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),

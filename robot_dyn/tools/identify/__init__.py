@@ -1,6 +1,7 @@
 """Identification: the parameters of an arm from its motion.
 
 excite               the motion within limits that shows the most about the parameters (Excitation, ExpectedPrecision)
+    static               gravity parameters, offsets and tilt from poses at rest (Poses, StaticEstimate)
 """
 
 from robot_dyn.foundations import public_names

@@ -2,5 +2,8 @@
 from robot_dyn.tools.identify.excitation import Excitation as Excitation
 from robot_dyn.tools.identify.excitation import excite as excite
 from robot_dyn.tools.identify.information import ExpectedPrecision as ExpectedPrecision
+from robot_dyn.tools.identify.rest_poses import Poses as Poses
+from robot_dyn.tools.identify.rest_poses import StaticEstimate as StaticEstimate
+from robot_dyn.tools.identify.rest_poses import static as static
 
 __all__: list[str]

@@ -51,11 +51,11 @@ class BaseParameters(Value):
         return tuple(name for name, used in zip(self.full_names, self.R.any(axis=0), strict=True) if not used)
 
 
-def base_parameters(arm: Robot) -> BaseParameters:
-    """Return the base parameters of an arm, from its regressor at 400 random states."""
+def base_parameters(arm: Robot, *, at_rest: bool = False) -> BaseParameters:
+    """Return the base parameters of an arm, from its regressor at 400 random states; `at_rest`, those of gravity."""
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (_STATES, arm.n))  # beyond the limits too: the functions are analytic
-    Y = np.asarray(arm.regressor(q, *rng.normal(0.0, 2.0, (2, _STATES, arm.n))))
+    Y = np.asarray(arm.regressor(q, *rng.normal(0.0, 0.0 if at_rest else 2.0, (2, _STATES, arm.n))))
     Y = Y.reshape(-1, Y.shape[-1])
     sizes = np.linalg.norm(Y, axis=0)
     unit = np.divide(Y, sizes, out=np.zeros_like(Y), where=sizes > _DEPENDENT * sizes.max())
