@@ -174,7 +174,7 @@ def compared(f: Function, relation: type[ast.cmpop], x: Scalar, y: Scalar, node:
 
 
 def truth(f: Function, x: Scalar) -> ir.Value:
-    """Return whether a number is not 0, as LLVM's I1."""
+    """Return True if a number is not 0, as LLVM's I1."""
     if x.kind == BOOL:
         return x.ir
     zero = ir.Constant(x.kind.llvm, 0)

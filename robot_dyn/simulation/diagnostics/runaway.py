@@ -79,7 +79,7 @@ def runaway_outcome(setup: Setup, record: Recording, fast: dict[str, float | str
 
     Args:
         setup: The setup of the run.
-        record: Its recording.
+        record: Recording of the run.
         fast: The joint that reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome
