@@ -304,7 +304,7 @@ def test_shrinking_that_has_no_time_keeps_the_smallest_failure_so_far(monkeypatc
         told.append(JudgedRun(what, 0.1, 1e-9, 1.0, 0.0, "", True, setup))
         return told[-1]
 
-    monkeypatch.setattr(runs, "judged", judged)
+    monkeypatch.setattr(runs, "compared_run", judged)
     work = Work(Budget(10, clock=ticking()))
     assert list(runs.judged_runs(robot, random_states(robot, 100, rng), 1, rng, work)) == told[-1:]
     assert work.out_of_time == ["shrinking of run 1"]
