@@ -92,7 +92,7 @@ class MotorBudget(Result):
         speed = torque | {"unit": [of_joint("rad/s", x.type) for x in joints]}
         at_peak, starts = {"at t [s]": [x.peak_at_s for x in joints]}, [x.breakaway for x in joints]
         yield f"limits: {self.limits}"
-        yield f"{self.resolution}; integrals by two rules differ by a fraction of {self.error:.1g}"
+        yield f"{self.resolution}; two rules of integration agree to {self.error:.1g}, relative"
         yield ""
         needs = torque | {"peak": [x.peak for x in joints]} | at_peak
         needs |= {"break-away": map(_four_digits, starts)} if any(x > 0 for x in starts) else {}
