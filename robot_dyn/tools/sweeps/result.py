@@ -338,7 +338,7 @@ class SweepResult(Answer):
 
     @reported
     def one_by_one(self) -> OneByOne:
-        """Runs made one by one, not in lock step, and their time."""
+        """Runs simulated one by one, not in lock step, and their time."""
         return self.folder.one_by_one()
 
     def reasons(self) -> dict[str, int]:
