@@ -37,11 +37,10 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation", "ExpectedPrecision",
-    "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "StaticEstimate", "Stress",
-    "SweepResult",
-    "Trajectory", "WorkPrecision",
+    "Advice", "CFunction", "CSource", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
+    "ExpectedPrecision", "InverseKinematics", "MotorBudget", "Motors", "PathPlan", "Plan", "Proof", "Rollouts", "Run",
+    "RunDifference", "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress", "SweepResult", "Trajectory",
+    "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -80,6 +79,7 @@ SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Set
 
 TOOLS = (
     rd.tools.doctor,
+    rd.tools.export,
     rd.tools.identify,
     rd.tools.motors,
     rd.tools.proof,
@@ -286,6 +286,11 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
+        call(rd.tools.export.c_source, arm_or_plant=robot, quantities=["N"], dtype="float32", name="arm"),
+        call(rd.tools.export.c_source(robot, ["N"]).write, folder=folder / "c", force=True),
+        call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
+        call(rd.tools.export.parameter_values, plant=plant),
+        call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
         call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
             tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),
         call(rd.tools.identify.Poses, q=states, tau=states, approach=np.ones((12, 2))),

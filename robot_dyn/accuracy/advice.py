@@ -50,7 +50,7 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 
 _PILOT_STATES = 9  # along the pilot run
-_FAST_STATES = 3  # of these, the fastest ones, at which limits are computed
+_FAST_STATES = 3  # number of these states, the fastest ones, at which limits are computed
 _MAX_STEPS = 200_000  # in a run for the error estimate
 _MAX_GROWTH = 1e3  # largest growth of deviations over such a run
 
@@ -64,7 +64,7 @@ class Advice(Answer):
 
     Attributes:
         method: The method of the setup.
-        step_s: Its longest step, in [s]; 0 if the method chooses its steps.
+        step_s: Longest step of the method, in [s]; 0 if the method chooses its steps.
         fastest: The fastest motion along the pilot run, with joint and source.
         at_s: Time of that motion, in [s].
         limits: Longest stable step of the setup's method and of every other fixed-step method, in [s]; inf if every

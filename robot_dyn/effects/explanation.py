@@ -49,8 +49,8 @@ class Term:
     """An edit of the robot, or an effect.
 
     Attributes:
-        kind: Its name in scenes.
-        term: Its equation in one line; empty for a user-defined effect without `term`.
+        kind: Name in scenes.
+        term: Equation in one line; empty for a user-defined effect without `term`.
         numbers: Numbers as written in a scene.
         coefficients: Coefficients as they act, with units.
     """

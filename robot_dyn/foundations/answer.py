@@ -17,11 +17,11 @@ class Table:
     """A table of texts and numbers.
 
     Attributes:
-        heading: Of the columns.
+        heading: Headings of the columns.
         rows: Cells, texts or numbers.
-        digits: Of numbers.
+        digits: Significant digits of numbers.
         right: Headings of columns whose texts stand at the right, as numbers do.
-        wrap: Whether a narrow terminal breaks its texts between words before it splits the table.
+        wrap: True if a narrow terminal breaks texts between words before it splits the table.
     """
 
     heading: tuple[str, ...]
@@ -31,7 +31,7 @@ class Table:
     wrap: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("heading", "right"):  # of files, too: a terminal would execute their control characters
+        for name in ("heading", "right"):  # names may come from files; a terminal would execute control characters
             object.__setattr__(self, name, tuple(map(escaped, getattr(self, name))))
 
     @property

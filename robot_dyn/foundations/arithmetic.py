@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from flint import arb
     from numpy.typing import DTypeLike
 
-Array = np.ndarray  # of floats, or of flint.arb objects: NumPy has one type for both
+Array = np.ndarray  # array of floats or flint.arb objects; NumPy has one type for both
 Numeral = str | SupportsFloat  # a number in the text of a file, or a number
 Scalar = float | np.ndarray  # one number, or one for each state of a batch
 Arguments = ParamSpec("Arguments")

@@ -82,6 +82,10 @@ class ControlError(RobotDynError):
     """A controller or reference with invalid values or shapes."""
 
 
+class ExportError(RobotDynError):
+    """Equations that cannot be exported as C or a CasADi Function: an effect switches, or a file is in the way."""
+
+
 class ProofError(RobotDynError):
     """A run for which no theorem can be proven: a part of it switches, or may not be analytic."""
 

@@ -141,7 +141,7 @@ class Armature(Edit):
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
         if self.inertia_kg_m2 == URDF:
-            stated = dict(loaded.edits.armature)  # of an MJCF file
+            stated = dict(loaded.edits.armature)  # stated by an MJCF file
             if not stated and not loaded.stated_armature.any():
                 raise SceneError("inertia_kg_m2: the robot's file states no armature; give it by joint")
             if "gear_ratio" in self.model_fields_set:

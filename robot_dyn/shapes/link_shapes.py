@@ -97,7 +97,7 @@ class _Reader:
     """Reader of the shapes of one file, which reads each mesh once."""
 
     def __init__(self, source: Path, package_dirs: tuple[str | Path, ...], allow_overlap: bool) -> None:
-        self.remarks: list[str] = []  # of the shape that is read
+        self.remarks: list[str] = []  # remarks on the current shape
         self.file = partial(find_file, source=source, package_dirs=package_dirs, remarks=self.remarks)
         self._mesh = cache(partial(_of_mesh, allow_overlap=allow_overlap))
 

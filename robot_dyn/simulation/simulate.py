@@ -124,8 +124,8 @@ class _Ran(NamedTuple):
     Attributes:
         setup: The setup, with the method of the run.
         engine: The engine of its state equation.
-        observer: Its observer.
-        recording: Its recording.
+        observer: Observer of the run.
+        recording: Recording of the run.
         run_s: Time of the run, without compiling, in [s].
         remarks: Remarks on a run that it replaces.
         runaway: The joint that reached an implausible speed, with its speed and limit; empty if there is none.

@@ -48,7 +48,7 @@ _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # steps per record period in runs that load machine code
 _UNKNOWN = 15  # order assumed for a method that chooses its own
 ATOL = 1e-2  # absolute tolerance over the relative one, as in `Adaptive`
-ORDERS = {"DOP853": 8, "Rodas5P": 5}  # of methods that choose their steps
+ORDERS = {"DOP853": 8, "Rodas5P": 5}  # orders of methods that choose their steps
 
 
 @final

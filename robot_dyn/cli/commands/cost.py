@@ -86,7 +86,7 @@ def certify(
     Options:
         samples: Number of random states.
         seed: Seed of the random states.
-        repeats: How often each query is timed.
+        repeats: Number of timings of each query.
         q: Positions of a state to certify as well, in the form of `query --q`.
         v: Velocities of this state; 0 by default.
         a: Accelerations of this state, for inverse dynamics; 0 by default.

@@ -151,7 +151,7 @@ class Lanes:
     __rsub__ = _operator("fsub", "contract", reflected=True)
     __truediv__ = _operator("fdiv", "contract")
     __rtruediv__ = _operator("fdiv", "contract", reflected=True)
-    plus, __and__, __lshift__, __xor__ = map(_operator, ("add", "and_", "shl", "xor"))  # of integers
+    plus, __and__, __lshift__, __xor__ = map(_operator, ("add", "and_", "shl", "xor"))  # operations on integers
 
     def of(self, x: Lanes | float) -> ir.Value:
         """Return a constant, or other lanes, as an LLVM value of this type."""

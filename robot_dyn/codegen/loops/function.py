@@ -69,8 +69,8 @@ class Function:
         self.globals = names_of(function)
         self._times = Counter(self.arguments.keys()) + stores(self.tree)
         self._kinds: dict[str, Kind] = dict(self.arguments)
-        self._values: dict[str, Value] = {}  # of names assigned at one place
-        self._slots: dict[str, list[ir.Value]] = {}  # of other names
+        self._values: dict[str, Value] = {}  # values of names assigned at one place
+        self._slots: dict[str, list[ir.Value]] = {}  # memory of other names
         self.assigned: set[str] = set()
         self.result: Kind | None = None
         self.may_fail = False

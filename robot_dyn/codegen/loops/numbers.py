@@ -172,7 +172,7 @@ def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.A
 
 
 def truth(f: Function, x: Scalar) -> ir.Value:
-    """Return whether a number is not 0, as LLVM's I1."""
+    """Return True if a number is not 0, as LLVM's I1."""
     if x.kind == BOOL:
         return x.ir
     zero = ir.Constant(x.kind.llvm, 0)

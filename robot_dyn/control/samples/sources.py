@@ -32,7 +32,7 @@ class DataFrame(Protocol):
         ...
 
     def to_numpy(self) -> np.ndarray:
-        """Return its values, one row for each row of the table."""
+        """Return the values of the columns, one row for each row of the table."""
         ...
 
 

@@ -24,12 +24,12 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 1e-6  # [rad] or [m], for runs without an estimate of their error
-HALF = 0.5  # of the time: least fraction that must be compared to conclude that runs are the same motion
+HALF = 0.5  # fraction of the time: least fraction that must be compared to conclude that runs are the same motion
 _MARGIN = 2.0  # factor on estimated errors
-_ROUNDING = 1e-12  # of the largest |q|: a smaller difference is rounding
-_SAME = 8 * np.finfo(float).eps  # of the largest time: difference of one time computed in two ways
-_PART = 0.5  # of the difference up to which runs are the same motion: largest error of interpolation
-_NEIGHBOUR = 0.5  # of the length of an interval: a shorter neighbour does not bound its error
+_ROUNDING = 1e-12  # fraction of the largest |q|: a smaller difference is rounding
+_SAME = 8 * np.finfo(float).eps  # relative difference of one time computed in two ways
+_PART = 0.5  # fraction of the difference up to which runs are the same motion: largest error of interpolation
+_NEIGHBOUR = 0.5  # fraction of the length of an interval: a shorter neighbour does not bound its error
 _CHUNK = 20_000  # times at which a run is interpolated at once
 
 

@@ -78,7 +78,7 @@ def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Out
 
     Args:
         setup: The setup of the run.
-        record: Its recording.
+        record: Recording of the run.
         fast: The joint that reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome

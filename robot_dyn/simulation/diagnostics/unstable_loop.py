@@ -38,7 +38,7 @@ def unstable(
     Args:
         setup: The setup of the run.
         t: Times of its samples, (m,), in [s].
-        y: Its states there, (m, size).
+        y: States of the loop there, (m, size).
         runs_away: True if the run diverged or reached an implausible speed. A continuous loop is examined only then:
             deviations may grow for a while along a correct motion.
         remedies: True to search for the period or the gains that are stable, which takes most of the time.

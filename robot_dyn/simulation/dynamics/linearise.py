@@ -26,10 +26,10 @@ from robot_dyn.queries.units import without_rounding
 from robot_dyn.simulation.dynamics.smooth_differences import ROUNDING, Column
 
 _AT_REST = 1e-9  # part of the sum of magnitudes of the terms of a rate
-_SOLVED = 1e-12  # of the largest entry of x: error of the other entries in the solution of a linear system
+_SOLVED = 1e-12  # fraction of the largest entry of x: error of the other entries in the solution of a linear system
 _LAYER = 20  # widths from v = 0 within which steps resolve a layer of friction
 _ITERATIONS = 60
-_NEAR = 1e-6  # of a threshold that is named as the cause of a kink
+_NEAR = 1e-6  # relative distance of a threshold that is named as the cause of a kink
 
 
 @final

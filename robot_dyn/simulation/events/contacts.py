@@ -87,7 +87,7 @@ def contacts_of(
 
     Args:
         equation: The state equation.
-        run_parameters: Its run parameters, with nothing held, (O, 1).
+        run_parameters: Run parameters of the equation, with nothing held, (O, 1).
         places: Places of the mode among them.
         most: Number of changes of the mode that accumulate if they lie within a brief time.
         brief: That time, in [s].
@@ -205,7 +205,7 @@ def _without(kind: Any, **fields: Any) -> Any:
     return kind(**dict.fromkeys(kind._fields, np.zeros(0)) | fields)
 
 
-NO_CONTACT = _without(  # of an equation in which nothing may hold joints
+NO_CONTACT = _without(  # for an equation in which nothing holds joints
     ContactMode,
     laws=_without(ContactLaws, n=0),
     places=Places._make([np.zeros(0, np.int64)] * 3),

@@ -188,7 +188,7 @@ class Remark:
     """An observation about one joint.
 
     Attributes:
-        kind: Its subject.
+        kind: Subject of the remark.
         joint: Name of the joint, or of the effect or frame that it concerns.
         quantity: "q", "v", "u" or "power": the quantity of value and limit.
         start_s: Time of its start, in [s].

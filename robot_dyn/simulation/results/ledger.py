@@ -17,7 +17,7 @@ from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
 _OPEN = 1e-3  # largest residual of a ledger that closes, relative to the energy exchanged
-_ROUNDING = 1e-12  # of the energies whose difference is the residual
+_ROUNDING = 1e-12  # fraction of the energies whose difference is the residual
 # Residuals relative to the energy exchanged: over 150 random scenes they were at most 10 times the estimated error of
 # q relative to the motion. A far larger one contradicts the estimate.
 _CONTRADICTS = 100.0
@@ -114,7 +114,7 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
 
     Args:
         ledger: The ledger of a run.
-        error: Its estimated error.
+        error: Estimated error of the run.
         q: Positions at its samples, (m, n).
     """
     if not ledger.closes:

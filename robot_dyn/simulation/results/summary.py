@@ -63,7 +63,7 @@ def of_tracking(run: RunData, of_frame: bool) -> str:
 
 
 def _not_estimated(run: TrajectoryData) -> str:
-    """Return that no error was estimated, and why."""
+    """Return the line for a run without an error estimate, with the reason."""
     if run.outcome.ending is Ending.STOPPED:
         return "not estimated (the run was stopped)"
     return f"not estimated ({'a run of rollouts' if 'run' in run.metadata else 'estimate_error is False'})"

@@ -27,8 +27,8 @@ class SetupParameter(Value):
     """A parameter that may differ from run to run.
 
     Attributes:
-        name: Its key in `vary` of `rollouts`.
-        value: Its value in the setup.
+        name: Key in `vary` of `rollouts`.
+        value: Value in the setup.
         unit: Unit for a revolute joint, and for a prismatic joint if that differs; empty if it has none.
         shape: Shape of its values over B runs, for example "(B,) or (B, 6)".
     """

@@ -40,12 +40,12 @@ from robot_dyn.simulation.setup.explanation import control_lines, law
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, MOST_CUT, ON_STEP, Segment, cuts, near, nodes, steps_on
 
 ENGINES = ("auto", "interpreted", "compiled")
-MOST_BYTES = 8 * 2**30  # of all records, by default
+MOST_BYTES = 8 * 2**30  # default limit of all records
 LONGEST_S = LEAST_EXACT / float_info.epsilon  # floats resolve the times of a run up to here
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # estimates; the second for two rows of a quintic reference
 STEP_S = 1e-3  # default step of a method of fixed step
-_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # of an adaptive method, if a part does not declare where it switches
+_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # adaptive method with a part that declares no switches
 
 CACHED = {
     "table_of": "the segments as arrays",

@@ -12,6 +12,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description import declared_first, other_format, parse
 from robot_dyn.foundations import DescriptionError
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 from robot_dyn.tools.doctor.tags import Place, decoded, edited, tags
 
 _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
@@ -86,7 +87,13 @@ class Document:
         return None
 
     def finding(
-        self, severity: Severity, kind: str, element: Any, what: str, remedy: str, changes: tuple[Change, ...] = ()
+        self,
+        severity: Severity,
+        kind: FindingKind,
+        element: Any,
+        what: str,
+        remedy: str,
+        changes: tuple[Change, ...] = (),
     ) -> Finding:
         """Return a finding at an element, with its link or joint and its line."""
         return Finding(severity, kind, self.where(element), what, remedy, element.sourceline, changes)

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Any, final
 
 from robot_dyn.foundations import UNREPORTED, shorten
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 
 class Severity(Enum):
@@ -91,7 +92,7 @@ class Finding:
     """
 
     severity: Severity
-    kind: str
+    kind: FindingKind
     where: str
     what: str
     remedy: str

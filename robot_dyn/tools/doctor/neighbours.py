@@ -20,6 +20,7 @@ from robot_dyn.foundations import QueryError, nearest, shown
 from robot_dyn.model import findings as doctor
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 from robot_dyn.tools.doctor.repairs import KEYS, UNITS, scaled
 
 _WIDE, _FAR = 3.0, 10.0  # [m] k and joint distances of arms with one or two joints: larger than any arm
@@ -54,14 +55,14 @@ def wide_links(document: Document, stated: Structure, shaped: Container[str]) ->
                 else f"{k / ratio:.3g} m, the size of this link in its arm"
             )
             yield document.finding(
-                Severity.WARNING, "inertia_wide", document.named("link", name).find("inertial"),
+                Severity.WARNING, FindingKind.INERTIA_WIDE, document.named("link", name).find("inertial"),
                 f"for {link.mass:g} kg, its inertia needs mass at least {k:.3g} m from the centre, beyond {most}",
                 f"correct the mass, the inertia, or its unit; {_ASK.format(name)}",
             )  # fmt: skip
     for name, joint in stated.joints.items() if small else ():
         if (length := hypot(*joint.xyz)) > _FAR:
             yield document.finding(
-                Severity.WARNING, "origin_far", document.named("joint", name),
+                Severity.WARNING, FindingKind.ORIGIN_FAR, document.named("joint", name),
                 f"its origin is {length:.3g} m from its parent link, over {_FAR:g} m, the largest in arms of one or two"
                 " joints",
                 "correct it, or convert it to metres",
@@ -98,7 +99,7 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
         elements = [*document.root.iterfind("link/inertial/inertia")] if power in units else []
         changes = (Change(x, key, scaled(x.get(key), -power)) for x in elements for key in KEYS if _nonzero(x, key))
         yield Finding(
-            Severity.ERROR, "inertia_unit", "robot",
+            Severity.ERROR, FindingKind.INERTIA_UNIT, "robot",
             "the moments of all links are too large by a common factor: their radii of gyration are typically"
             f" {np.median(ratios):.0f} times the size of the link: the unit {' or '.join(units.values())} is suspected",
             f"export in kg m², or convert all moments: {' or '.join(map(_option, units.values()))}",
@@ -106,7 +107,8 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
         )  # fmt: skip
     if unit is not None and power not in units:
         yield Finding(
-            Severity.NOTE, "inertia_unit", "robot", f"its moments do not look like {name} and were not converted",
+            Severity.NOTE, FindingKind.INERTIA_UNIT, "robot",
+            f"its moments do not look like {name} and were not converted",
             f"choose {' or '.join(units.values())}" if units else "remove inertia_unit, or correct single links",
         )  # fmt: skip
 
@@ -146,7 +148,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
 
     Args:
         document: The file.
-        stated: Its structure.
+        stated: Structure of the robot.
         volumes: Volume of the shapes of each link, in [m³].
     """
     mass_of = {joint: sum(stated.links[name].mass for name in links) for joint, links in stated.bodies.items()}
@@ -172,7 +174,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
             continue
         name = stated.joints[joint].child
         element = document.named("link", name)
-        yield document.finding(Severity.WARNING, "mass_neighbours", element, what, _ASK.format(name))
+        yield document.finding(Severity.WARNING, FindingKind.MASS_NEIGHBOURS, element, what, _ASK.format(name))
 
 
 def of_data_sheet(document: Document, stated: Structure, sheet: Sheet) -> Iterator[Finding]:
@@ -181,14 +183,14 @@ def of_data_sheet(document: Document, stated: Structure, sheet: Sheet) -> Iterat
         own = stated.links[name].mass
         if abs(own - mass) > _DIFFERENT * mass:
             yield document.finding(
-                Severity.WARNING, "mass_sheet", document.named("link", name),
+                Severity.WARNING, FindingKind.MASS_SHEET, document.named("link", name),
                 f"its mass is {own:.4g} kg, but {mass:.4g} kg was given for it: a factor of {own / mass:.3g}",
                 "correct the mass, and the moments with it if they have the same factor",
             )  # fmt: skip
     total = sum(link.mass for link in stated.links.values())
     if sheet.total is not None and abs(total - sheet.total) > _DIFFERENT * sheet.total:
         yield document.finding(
-            Severity.WARNING, "mass_sheet", document.root,
+            Severity.WARNING, FindingKind.MASS_SHEET, document.root,
             f"all links together have {total:.4g} kg, but {sheet.total:.4g} kg was given: a factor of"
             f" {total / sheet.total:.3g}",
             "give --mass LINK=KG for links you know, to find the wrong one; correct its mass",

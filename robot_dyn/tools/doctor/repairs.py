@@ -18,7 +18,7 @@ from robot_dyn.tools.doctor.inertia_bounds import Body, matrix
 
 KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
-_SAME = 1e-3  # of the largest moment: candidates this close are one
+_SAME = 1e-3  # fraction of the largest moment: candidates this close are one
 _POWERS = (-3, -2, -1, 1, 2, 3)
 # Orders in which programs write six moments, as places in ixx, ixy, ixz, iyy, iyz, izz
 _ORDERS = {

@@ -169,7 +169,7 @@ class Folder:
             raise SweepError(f"{file}: is not the comparison of an uncut sweep ({shown(error)}); {again}") from None
 
     def one_by_one(self) -> OneByOne:
-        """Return how many runs of the present chunks were made one by one, and how long that took."""
+        """Return the number of runs of the present chunks that were made one by one, and their time."""
         chunks = np.flatnonzero(self.present()).tolist()
         return sum((OneByOne(**self.footer(chunk)["one_by_one"]) for chunk in chunks), IN_LOCK_STEP)
 

@@ -24,7 +24,7 @@ from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
-_MOST_LINES = 100  # of runs that diverged
+_MOST_LINES = 100  # drawn runs that diverged
 _CELL_MM = 42.0  # the least width of a cell
 
 

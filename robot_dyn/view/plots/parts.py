@@ -33,7 +33,7 @@ class View:
         joints: Columns of the joints shown.
         types: Type of each joint of the run; None where it is not known.
         efforts, speeds: Limits of u and v of each joint of the run, in SI units; inf for none.
-        width: Of the figure, in [mm].
+        width: Width of the figure, in [mm].
     """
 
     run: TrajectoryData

@@ -22,8 +22,8 @@ from robot_dyn.view.video.browser import frames, installed, playwright
 KINDS = FileKind("an MP4 video", ".mp4", b"\0\0\0"), FileKind("a GIF", ".gif", b"GIF8")
 _FPS, _MOST_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
 _MOST_FRAMES = 20_000
-_ROUNDING = 1e-9  # of a frame: T fps is a whole number up to this
-_MOST_PIXELS = 5 * 10**8  # of a GIF, whose frames are held in memory, with 4.5 bytes for each
+_ROUNDING = 1e-9  # fraction of a frame: T fps is a whole number up to this
+_MOST_PIXELS = 5 * 10**8  # pixels of a GIF; its frames take 4.5 bytes a pixel in memory
 _LEAST_SIZE, _MOST_SIZE = 160, 3840
 
 

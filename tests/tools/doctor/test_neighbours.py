@@ -52,6 +52,23 @@ def test_moments_that_no_link_of_this_length_has_are_reported(tmp_path: Path) ->
     assert kinds(arm(tmp_path, [right, LOWER, WRIST], [0.2, 0.36, 0.3])) == set()
 
 
+@pytest.mark.parametrize("radius", [0.2, 0.35, 0.37, 0.8, 2.0])
+def test_a_radius_of_gyration_beyond_the_next_joint_is_reported(tmp_path: Path, radius: float) -> None:
+    """½ tr I = m k² in a link whose next joint is 0.36 m away."""
+    moment = 2 / 3 * 4.0 * radius**2
+    path = arm(tmp_path, [link("upper", 4.0, "0 0 0.1", moment, moment, moment), LOWER, WRIST], [0.2, 0.36, 0.3])
+    assert (("inertia_wide", "link 'upper'") in kinds(path)) is (radius > 0.36)
+
+
+@pytest.mark.parametrize(("mass", "reported"), [(3.0, False), (3.14, False), (3.2, True), (0.3, True), (30.0, True)])
+def test_a_mass_more_than_5_percent_from_the_data_sheet_is_reported(
+    tmp_path: Path, mass: float, reported: bool
+) -> None:
+    path = arm(tmp_path, [LOWER, WRIST], [0.2, 0.36])
+    for options in ({"mass": {"lower": mass}}, {"total_mass": mass + 0.38}):
+        assert ("mass_sheet" in {kind for kind, _ in kinds(path, **options)}) is reported
+
+
 @pytest.mark.parametrize("tool", [[], [link("tool", 0.5, "0 0 0.03", 4e-4, 4e-4, 3e-4)]])
 def test_a_wrist_of_a_few_grams_is_reported(tmp_path: Path, tool: list[str]) -> None:
     """7 g after a link of 0.38 kg, at the end of the arm and before a tool; 0.07 kg is not."""

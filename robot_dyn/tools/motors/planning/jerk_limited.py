@@ -22,7 +22,7 @@ from robot_dyn.tools.motors.limits import outside_positions
 _SAME = 1e-12  # relative to the duration: breaks of two joints that differ by less are one
 
 
-_Segment = tuple[float, ...]  # of one joint: start time, position, velocity, acceleration, jerk
+_Segment = tuple[float, ...]  # a joint's start time, position, velocity, acceleration, jerk
 
 
 def point_to_point(
