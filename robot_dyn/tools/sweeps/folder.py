@@ -156,7 +156,7 @@ class Folder:
         save(self.path / UNCUT, lambda stream: stream.write(text.encode()), SweepError)
 
     def comparison(self) -> Comparison | None:
-        """Return the comparison of an uncut sweep, None if it was not made; raise a SweepError if it is damaged."""
+        """Return the comparison of an uncut sweep, None if there is none; raise a SweepError if it is damaged."""
         file, again = self.path / UNCUT, "remove this file, and run the sweep again, which compares the runs again"
         if not file.exists():
             return None
@@ -169,7 +169,7 @@ class Folder:
             raise SweepError(f"{file}: is not the comparison of an uncut sweep ({shown(error)}); {again}") from None
 
     def one_by_one(self) -> OneByOne:
-        """Return the number of runs of the present chunks that were made one by one, and their time."""
+        """Return the number of runs of the present chunks that were simulated one by one, and their time."""
         chunks = np.flatnonzero(self.present()).tolist()
         return sum((OneByOne(**self.footer(chunk)["one_by_one"]) for chunk in chunks), IN_LOCK_STEP)
 

@@ -21,6 +21,7 @@ from robot_dyn.foundations import (
     choice,
     integer,
     nearest,
+    needs,
     reported,
     save,
     target,
@@ -89,6 +90,19 @@ class SweepResult(Answer):
         table = self.folder.columns(name for name in names if name != "run")
         table["run"] = np.arange(self.sweep.runs)
         return {name: table[name] for name in names}
+
+    def to_pandas(self, *names: str) -> Any:
+        """Return `table` as a `pandas.DataFrame` with the number of the run as its index.
+
+        Args:
+            *names: Columns, by default all.
+
+        Raises:
+            MissingExtraError: Without pandas: pip install 'robot-dyn[sweeps]'.
+            SweepError: If a column is unknown, or chunks are missing.
+        """
+        frame = needs("pandas", extra="sweeps").DataFrame(self.table(*names))
+        return frame.set_index("run") if "run" in frame else frame.rename_axis("run")
 
     def quantiles(
         self,
@@ -338,7 +352,7 @@ class SweepResult(Answer):
 
     @reported
     def one_by_one(self) -> OneByOne:
-        """Runs made one by one, not in lock step, and their time."""
+        """Runs simulated one by one, not in lock step, and their time."""
         return self.folder.one_by_one()
 
     def reasons(self) -> dict[str, int]:

@@ -30,10 +30,10 @@ Look = Callable[[float], object]
 @final
 @dataclass(frozen=True)
 class OneByOne:
-    """Runs made one by one, not in lock step.
+    """Runs simulated one by one, not in lock step.
 
     Attributes:
-        runs: Their number.
+        runs: Number of these runs.
         runs_s: Time of these runs, in [s].
         all_s: Time of all runs, in [s].
     """
@@ -80,7 +80,7 @@ class Work:
 
     @property
     def part(self) -> int:
-        """Number of runs that are made together: a multiple of the tile size, limited by memory."""
+        """Number of runs that are simulated together: a multiple of the tile size, limited by memory."""
         n, samples = self.sweep.setup.plant.dynamics.n, samples_of_run(self.sweep.setup)
         numbers = sum({"energy": 2, "work": 8}.get(name, n) for name in self.record)
         return LANES * max(1, min(256, _PART_BYTES // (8 * LANES * samples * max(1, numbers))))
