@@ -75,6 +75,7 @@ from robot_dyn.foundations.spatial import adjoint as adjoint
 from robot_dyn.foundations.spatial import adjoint_inverse as adjoint_inverse
 from robot_dyn.foundations.spatial import block_diagonal as block_diagonal
 from robot_dyn.foundations.spatial import bracket as bracket
+from robot_dyn.foundations.spatial import first_moment as first_moment
 from robot_dyn.foundations.spatial import hat as hat
 from robot_dyn.foundations.spatial import homogeneous as homogeneous
 from robot_dyn.foundations.spatial import rotation as rotation
