@@ -10,6 +10,7 @@ from robot_dyn.foundations.arithmetic import Arithmetic as Arithmetic
 from robot_dyn.foundations.arithmetic import Array as Array
 from robot_dyn.foundations.arithmetic import Ball as Ball
 from robot_dyn.foundations.arithmetic import Float as Float
+from robot_dyn.foundations.arithmetic import Numeral as Numeral
 from robot_dyn.foundations.arithmetic import arithmetic_of as arithmetic_of
 from robot_dyn.foundations.arithmetic import midpoint as midpoint
 from robot_dyn.foundations.arithmetic import radius as radius

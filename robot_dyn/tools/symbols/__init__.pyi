@@ -5,3 +5,7 @@ from robot_dyn.tools.symbols.letters import Meaning as Meaning
 from robot_dyn.tools.symbols.letters import RoundedAngle as RoundedAngle
 
 __all__: list[str]
+
+# Names that tests import of this folder.
+from robot_dyn.tools.symbols.letters import Lettering as Lettering
+from robot_dyn.tools.symbols.polynomials import Numbers as Numbers

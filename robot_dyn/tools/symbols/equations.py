@@ -13,7 +13,7 @@ from robot_dyn import Robot
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.foundations import QueryError, first_moment, needs, shown
 from robot_dyn.lagrange import FORMULAS, Linkage, Pose, linkage_of, tree_of
-from robot_dyn.tools.symbols.fourier import Terms, expression, shortest
+from robot_dyn.tools.symbols.fourier import expression, shortest
 from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle
 from robot_dyn.tools.symbols.polynomials import Letter, Numbers, Polynomials, Turn
 
@@ -93,7 +93,7 @@ class SymbolicEquations:
         return result
 
     def latex(self) -> str:
-        """Return the equations in LaTeX, one line an entry, for `\\begin{align*}` of amsmath.
+        """Return the equations in LaTeX, one line an entry, in an align* environment of amsmath.
 
         M is symmetric: its upper triangle is printed. Entries that are not printed are zero.
 
@@ -165,12 +165,14 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     if letters not in ("file", "base", None):
         raise QueryError(f"letters must be 'file', 'base' or None, got {shown(letters)}")
     tree = tree_of(arm.description, arm.edits)
-    followers = [joint.name for joint in tree.joints if joint.mimic and joint.kind != "fixed"]
-    if followers:
-        raise QueryError(
-            f"joint {followers[0]!r} follows another joint, and formulas need independent ones: remove its <mimic>, or"
-            " write C code by rd.tools.export.c_source(arm)"
-        )
+    locked = {joint.name for joint in tree.joints if joint.kind == "fixed" or joint.locked is not None}
+    for joint in tree.joints:
+        source = joint.mimic.source if joint.mimic and joint.name not in locked else None
+        if source is not None and source not in locked:
+            raise QueryError(
+                f"joint {joint.name!r} follows {source!r}, and formulas need independent joints: lock it by"
+                f" arm.with_(lock={{{source!r}: 0.0}}), or remove its <mimic>"
+            )
     lettering = Lettering(named=letters == "file")
     lettered = lettering.tree(tree, arm.joint_names)
     meanings = dict(lettering.letters)
@@ -198,7 +200,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     ]
     v = ring.array([Letter(name) for name in rates])
     at = linkage.at(q)
-    results = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
+    results: dict[str, Any] = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
     return _named(
         SymbolicEquations(arm, meanings, tuple(lettering.rounded), results, _parallel(linkage, arm.joint_names))
     )
@@ -215,7 +217,7 @@ def _named(equations: SymbolicEquations) -> SymbolicEquations:
     moments = [name for name in letters if name[0] == "I" and name.partition("_")[2] in MOMENTS]
     parts = [name.partition("_")[0] for name in moments]
     names = {name: part for name, part in zip(moments, parts, strict=True) if parts.count(part) == 1}
-    renamed = Polynomials(tuple(names.get(name, name) for name in ring.letters), ring.angles)
+    renamed = Polynomials(tuple(str(names.get(name, name)) for name in ring.letters), ring.angles)
     converted = {
         key: np.vectorize(renamed.of, otypes=[object])(entries) for key, entries in equations.polynomials.items()
     }
@@ -244,7 +246,10 @@ def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[
         values |= {f"{name.upper()}{k}": inertia[3 + i, 3 + j] for name, (i, j) in pairs.items()}
         symbols = {name: Letter(name) if value else 0 for name, value in values.items()}
         M, X, Y, Z, XX, XY, XZ, YY, YZ, ZZ = symbols.values()
-        minus = {name: replace(x, negative=True) if x else 0 for name, x in zip("XYZ", (X, Y, Z), strict=True)}
+        minus = {
+            name: replace(x, negative=True) if isinstance(x, Letter) else 0
+            for name, x in zip("XYZ", (X, Y, Z), strict=True)
+        }
         rows = [
             [M, 0, 0, 0, Z, minus["Y"]], [0, M, 0, minus["Z"], 0, X], [0, 0, M, Y, minus["X"], 0],
             [0, minus["Z"], Y, XX, XY, XZ], [Z, 0, minus["X"], XY, YY, YZ], [minus["Y"], X, 0, XZ, YZ, ZZ],
@@ -260,7 +265,9 @@ def _parallel(linkage: Linkage, joint_names: tuple[str, ...]) -> tuple[tuple[str
     for i, body in enumerate(linkage.bodies):
         parent = linkage.bodies[body.parent] if body.parent >= 0 else None
         axis = body.pose.R @ body.axis
-        parallel = parent and body.revolute and parent.revolute and (all(axis == parent.axis) or all(axis == -parent.axis))
+        parallel = (
+            parent and body.revolute and parent.revolute and (all(axis == parent.axis) or all(axis == -parent.axis))
+        )
         chains[i] = [*chains[body.parent], i] if parallel else [i]
     longest = sorted((chain for chain in chains.values() if len(chain) > 1), key=len, reverse=True)
     names = [f"q{joint_names.index(body.joint) + 1}" for body in linkage.bodies]

@@ -1,15 +1,18 @@
 """Polynomials as SymPy expressions, with cos(q1 + q2) of joints with parallel axes where that is shorter.
 
-    cos K cos q = ½ (cos(K + q) + cos(K − q)),   sin K cos q = ½ (sin(K + q) + sin(K − q)), …
+cos K cos q = ½ (cos(K + q) + cos(K − q)),   sin K cos q = ½ (sin(K + q) + sin(K − q)), …
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot_dyn.tools.symbols.polynomials import ROOTS, Polynomial
+
+if TYPE_CHECKING:
+    import sympy as sp
 
 Exponents = tuple[int, ...]
 Harmonic = tuple[bool, tuple[int, ...]]  # True for a cosine; multiples of the angles of a group
@@ -62,7 +65,7 @@ def _times(sums: dict[Harmonic, Fraction], is_cosine: bool, k: int) -> dict[Harm
     return {harmonic: x for harmonic, x in result.items() if x}
 
 
-def expression(terms: Terms, names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> Any:
+def expression(terms: Terms, names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> sp.Expr:
     """Return a SymPy expression, with the terms of each mass collected."""
     import sympy as sp
 
@@ -77,7 +80,8 @@ def expression(terms: Terms, names: tuple[str, ...], groups: tuple[tuple[str, ..
         if mass:
             factors.remove(letter[mass])
         masses[mass].append(sp.Mul(sp.Rational(x.numerator, x.denominator), *factors))
-    return sp.Add(*(sp.Mul(letter[mass], sp.Add(*parts)) if mass else sp.Add(*parts) for mass, parts in masses.items()))
+    sums = {mass: sp.factor_terms(sp.Add(*parts)) for mass, parts in masses.items()}  # common factors, no more
+    return sp.Add(*(sp.Mul(letter[mass], total) if mass else total for mass, total in sums.items()))
 
 
 def _generator(name: str) -> Any:

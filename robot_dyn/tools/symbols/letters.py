@@ -67,7 +67,7 @@ class Lettering:
     """A tree being lettered.
 
     Attributes:
-        named: True if lengths, masses, moments and gravity become letters; angles do where they are no multiples.
+        named: True if lengths, masses, moments and gravity become letters; general angles always do.
         letters: Letters so far.
         angles: Names of letters that are angles.
         rounded: Angles read as multiples.
@@ -84,7 +84,7 @@ class Lettering:
         body = {tree.root: 0}
         joints = []
         for joint in tree.joints:
-            moves = joint.kind != "fixed" and joint.locked is None
+            moves = joint.name in joint_names
             body[joint.child] = joint_names.index(joint.name) + 1 if moves else body[joint.parent]
             joints.append(self._joint(joint, body))
         links = tuple(
@@ -111,9 +111,7 @@ class Lettering:
         return replace(
             joint,
             xyz=xyz,
-            rpy=tuple(
-                self._angle(x, f"{name} of {where}") for name, x in zip(("roll", "pitch", "yaw"), joint.rpy, strict=True)
-            ),
+            rpy=self._rpy(joint.rpy, where),
             axis=self._axis(joint.axis, f"axis of {where}") if joint.kind != "fixed" else joint.axis,
             armature=self._number(f"J{body[joint.child]}", joint.armature, f"armature of {where}") if moves else "0",
             locked=locked,
@@ -126,10 +124,7 @@ class Lettering:
             self._number(f"m{label}", part.mass, f"mass of {where}", part.scale),
             tuple(self._number(f"I{label}_{k}", x, f"i{k} of {where}", part.scale) for k, x in moments),
             self._vector("r", label, part.xyz, f"centre of mass of {where}"),
-            tuple(
-                self._angle(x, f"{k} of the inertia of {where}")
-                for k, x in zip(("roll", "pitch", "yaw"), part.rpy, strict=True)
-            ),
+            self._rpy(part.rpy, f"the inertia of {where}"),
         )
 
     def _gravity(self, gravity: Any) -> Any:
@@ -172,6 +167,10 @@ class Lettering:
         self.angles.append(name)
         self.letters[name] = Meaning(angle, where)
         return Angle(name=name)
+
+    def _rpy(self, angles: Any, where: str) -> Any:
+        names = zip(("roll", "pitch", "yaw"), angles, strict=True)
+        return tuple(self._angle(x, f"{name} of {where}") for name, x in names)
 
     def _axis(self, axis: Any, where: str) -> Any:
         x, y, z = map(float, axis)

@@ -14,14 +14,14 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, SupportsFloat, final
 
 import numpy as np
 
-from robot_dyn.foundations import Arithmetic, QueryError
+from robot_dyn.foundations import Arithmetic, Numeral, QueryError
 
 if TYPE_CHECKING:
-    from flint import fmpq_mpoly
+    from flint import fmpq, fmpq_mpoly
 
 MAX_TERMS = 20_000  # of one polynomial; a page has some 40, and products of larger ones take minutes
 ROOTS = {"sqrt2": 2, "sqrt3": 3}
@@ -68,8 +68,10 @@ class Polynomial:
         return Polynomial(self.ring, value)
 
     def _operand(self, other: object) -> Any:
-        if isinstance(other, Polynomial):
+        if type(other) is Polynomial:
             return other.value
+        if type(other) is int:
+            return other  # flint has operators of polynomials and integers
         return self.ring.constant(other) if isinstance(other, int | float | Fraction | np.number) else None
 
     def __add__(self, other: object) -> Polynomial:
@@ -84,10 +86,12 @@ class Polynomial:
         return -self + other
 
     def __mul__(self, other: object) -> Polynomial:
+        if type(other) is Polynomial:
+            if not self.value or not other.value:
+                return self if not self.value else other
+            return self._with(self.ring.reduced(self.value * other.value))
         y = self._operand(other)
-        if y is None:
-            return NotImplemented
-        return self._with(self.ring.reduced(self.value * y) if isinstance(other, Polynomial) else self.value * y)
+        return NotImplemented if y is None else self._with(self.value * y)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -97,6 +101,11 @@ class Polynomial:
 
     def __neg__(self) -> Polynomial:
         return self._with(-self.value)
+
+    def __abs__(self) -> Polynomial:
+        if not self.value.is_constant():
+            raise ValueError("the absolute value of a polynomial")
+        return -self if any(x < 0 for x in self.value.coeffs()) else self
 
     def __bool__(self) -> bool:
         return bool(self.value)
@@ -143,11 +152,15 @@ class Turn:
         """Return the cosine."""
         return self.c
 
-    # A locked joint is at ratio · value + offset, with ratio 1 and offset 0 where no joint follows another.
+    # A locked joint is at ratio · value + offset, with ratio 1 and offset 0 where it follows no other.
     def __rmul__(self, ratio: Polynomial) -> Turn:
+        if ratio != 1:
+            raise QueryError("a locked joint follows another with a multiplier: remove its <mimic>")
         return self
 
     def __add__(self, offset: Polynomial) -> Turn:
+        if offset != 0:
+            raise QueryError("a locked joint follows another with an offset: remove its <mimic>")
         return self
 
 
@@ -158,7 +171,7 @@ class Polynomials(Arithmetic):
 
     Attributes:
         letters: Names of letters, rates and sliding coordinates.
-        angles: Names of angles, each of which has a sine "s_name" and a cosine "c_name".
+        angles: Names of angles; generators are the sine "s_name" and the cosine "c_name" of each.
     """
 
     letters: tuple[str, ...]
@@ -191,7 +204,7 @@ class Polynomials(Arithmetic):
         circles = [(at(f"s_{name}"), x[f"s_{name}"] ** 2 + x[f"c_{name}"] ** 2 - 1) for name in self.angles]
         return circles + [(at(name), x[name] ** 2 - square) for name, square in ROOTS.items()]
 
-    def reduced(self, value: Any) -> Any:
+    def reduced(self, value: fmpq_mpoly) -> fmpq_mpoly:
         """Return the remainder by the relations; raise QueryError for a polynomial that is too long to read."""
         if len(value) > MAX_TERMS:
             raise QueryError(
@@ -205,18 +218,18 @@ class Polynomials(Arithmetic):
                     value = value % relation
         return value
 
-    def constant(self, x: Any) -> Any:
+    def constant(self, x: str | SupportsFloat) -> fmpq:
         """Return a number as a rational of flint."""
         from flint import fmpq
 
-        exact = Fraction(x.item() if isinstance(x, np.generic) else x)
+        exact = Fraction(x) if isinstance(x, str | int | Fraction) else Fraction(float(x))
         return fmpq(exact.numerator, exact.denominator)
 
     def generator(self, name: str) -> Polynomial:
         """Return a generator by its name."""
         return Polynomial(self, self._generators[name])
 
-    def number(self, literal: Any) -> Any:
+    def number(self, literal: Numeral | Letter | Angle | Component | Polynomial | Turn) -> Polynomial | Turn:  # pyright: ignore[reportIncompatibleMethodOverride]
         if isinstance(literal, Letter):
             letter = self.generator(literal.name)
             return -letter if literal.negative else letter
@@ -227,11 +240,18 @@ class Polynomials(Arithmetic):
             return (elevation.c * azimuth.c, elevation.c * azimuth.s, elevation.s)[literal.k]
         if isinstance(literal, Polynomial | Turn):
             return literal
-        return Polynomial(self, self._context.constant(self.constant(literal)))
+        return self._constant(literal)
 
-    def of(self, x: Any) -> Polynomial:
+    def of(self, x: Polynomial | int) -> Polynomial:
         """Return a polynomial of a ring with as many generators, whose letters have other names; or a number."""
-        return Polynomial(self, self._context.from_dict(x.value.to_dict())) if isinstance(x, Polynomial) else self.number(x)
+        return (
+            Polynomial(self, self._context.from_dict(x.value.to_dict()))
+            if isinstance(x, Polynomial)
+            else self._constant(x)
+        )
+
+    def _constant(self, x: Numeral) -> Polynomial:
+        return Polynomial(self, self._context.constant(self.constant(x)))
 
     def _turn(self, angle: Angle) -> Turn:
         if angle.name:
@@ -244,8 +264,10 @@ class Polynomials(Arithmetic):
         if k > 12:
             return -self._sine(k - 12)
         k = min(k, 12 - k)
-        one, two, three = self.number(1), self.generator("sqrt2"), self.generator("sqrt3")
-        return (one * 0, two * (three - 1) / 4, one / 2, two / 2, three / 2, two * (three + 1) / 4, one)[k]
+        if k in (0, 6):
+            return self._constant(k // 6)
+        one, two, three = self._constant(1), self.generator("sqrt2"), self.generator("sqrt3")
+        return (two * (three - 1) / 4, one / 2, two / 2, three / 2, two * (three + 1) / 4)[k - 1]
 
     def scope(self) -> AbstractContextManager[None]:
         return nullcontext()
@@ -273,7 +295,7 @@ class Numbers(Arithmetic):
         """Type of entries: float64."""
         return np.dtype(np.float64)
 
-    def number(self, literal: Any) -> Any:
+    def number(self, literal: Numeral | Letter | Angle | Component) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
         if isinstance(literal, Letter):
             return self.values[literal.name] * (-1 if literal.negative else 1)
         if isinstance(literal, Angle):
