@@ -67,7 +67,7 @@ class PlanError(RobotDynError):
 
 
 class VideoError(RobotDynError):
-    """A video that cannot be made: the page has no run, the video is too long, or there is no browser."""
+    """A video that cannot be rendered: the page has no run, the video is too long, or there is no browser."""
 
 
 class TraceError(RobotDynError):

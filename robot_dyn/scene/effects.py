@@ -218,7 +218,7 @@ _LINE = declared_part(
     },
 )  # fmt: skip
 _OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, Wrench, Carried)}
-"""Tables that are not made from one class, by kind."""
+"""Tables that are not built from one class, by kind."""
 
 
 def _acting() -> Iterator[type[Acting]]:

@@ -234,6 +234,9 @@ class Remark:
         """The remedy, the same for all remarks of a kind in a run; empty if there is none."""
         return sentence(_SENTENCES[self.kind].remedy, self.fields)
 
+    def __str__(self) -> str:
+        return _line(self.kind, [self])
+
 
 def line_parts(kind: RemarkKind) -> Parts:
     """Return the parts of the line about one remark of a kind."""

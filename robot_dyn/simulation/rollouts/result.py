@@ -204,7 +204,7 @@ class Rollouts(RolloutsData):
         return "\n".join(escaped(line) for line in lines)
 
     def _one_by_one(self) -> Iterator[str]:
-        """Yield how many runs were made one by one, and how long that took."""
+        """Yield the number of runs that were simulated one by one, and their time."""
         ran = self.statistics
         if ran.one_by_one and len(self) > 1:
             remedy = ""

@@ -86,8 +86,8 @@ class FindingKind(StrEnum):
     """Moving bodies differ by more than 1e4 in mass."""
     MASS_NEIGHBOURS = "mass_neighbours"
     """A moving body is 30 times lighter than each of its neighbours, and, at the end of an arm, 10 times lighter
-    than all other bodies. Or it is 4 times heavier than its neighbours and denser than steel, 8000 kg/m³, in its
-    shape."""
+    than all other bodies. Or it is 4 times heavier than its neighbours and has 8000 to 12000 kg/m³, steel to lead,
+    in its shape."""
     MASS_SHEET = "mass_sheet"
     """A mass given with `--mass` or `--total-mass` differs from the one in the file by more than 5 %."""
     INERTIA_WIDE = "inertia_wide"

@@ -27,7 +27,8 @@ _WIDE, _FAR = 3.0, 10.0  # [m] k and joint distances of arms with one or two joi
 _UNIT = 8.0  # median of k relative to the arm; 0.1 to 0.8 in 40 arms of the catalog, and 30 times that in g m²
 _TYPICAL = 0.08, 0.8  # the same ratio in kg m²
 _LIGHTER, _LIGHTEST = 30.0, 10.0  # times lighter than each neighbour, and than all other bodies
-_STEEL, _HEAVIER = 8e3, 4.0  # [kg/m³]; times heavier than each neighbour
+_STEEL, _LEAD = 8e3, 1.2e4  # [kg/m³]; above lead a shape covers part of its link, or `mass_density` reports it
+_HEAVIER = 4.0  # times heavier than each neighbour
 _DIFFERENT = 0.05  # relative difference of masses from those of a data sheet
 _ASK = "compare with the data sheet: give --mass {}=KG or --total-mass KG (mass=, total_mass= in Python)"
 
@@ -165,7 +166,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
         density = mass / volume if volume else 0.0
         if alone and min(masses) > _LIGHTER * mass:
             what = f"its body has {mass:.3g} kg, but its neighbours have {min(masses):.3g} kg or more"
-        elif density > _STEEL and mass > _HEAVIER * max(masses) > 0:
+        elif _STEEL < density <= _LEAD and mass > _HEAVIER * max(masses) > 0:
             what = (
                 f"its body has {mass:.4g} kg, {mass / max(masses):.2g} times its heaviest neighbour, and"
                 f" {density:.4g} kg/m³, more than steel"

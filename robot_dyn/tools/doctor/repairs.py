@@ -66,7 +66,8 @@ def _candidates(body: Body, texts: dict[str, str], mass: str) -> Iterator[Repair
 
 def _axes(texts: dict[str, str]) -> Iterator[Repair]:
     places = {(0, 0): "ixx", (0, 1): "ixy", (0, 2): "ixz", (1, 1): "iyy", (1, 2): "iyz", (2, 2): "izz"}
-    for axes in list(permutations(range(3)))[1:]:
+    orders = list(permutations(range(3)))[1:]
+    for axes in sorted(orders, key=lambda axes: sum(i != axis for i, axis in enumerate(axes))):  # exchanges first
         fixed = [_AXES[i] for i in range(3) if axes[i] == i]
         turned = [_AXES[i] for i in range(3) if axes[i] != i]
         what = f"the axes {' and '.join(turned)} exchanged" if fixed else "the axes x, y and z in another order"

@@ -146,3 +146,13 @@ def test_a_possible_body_is_left_alone() -> None:
     links = [body(rng) for _ in range(200)]
     assert max(excess(link.mass, link.moments, link.points).ratio for link in links) < SLACK
     assert all(link.plausible() for link in links)
+
+
+@pytest.mark.parametrize(("axes", "name"), [([1, 0, 2], "x and y"), ([2, 1, 0], "x and z"), ([1, 2, 0], "x and z")])
+def test_an_exchange_of_two_axes_is_named_before_an_order_with_the_same_numbers(axes: list[int], name: str) -> None:
+    """A bar along x: iyy = izz, so a cyclic order of the axes gives the numbers of an exchange."""
+    edges = np.array([0.6, 0.05, 0.05])
+    own = np.diag((edges @ edges - edges**2) / 12)
+    volume = float(edges.prod())
+    wrong = Body(2.0, 2.0 * own[axes][:, axes], CORNERS * edges, np.zeros(3), (volume, volume * own))
+    assert [repair.mistake for repair in repairs(wrong, texts(wrong), "2.0")] == [f"the axes {name} exchanged"]

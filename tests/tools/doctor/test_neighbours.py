@@ -188,3 +188,13 @@ def test_a_dense_body_next_to_one_without_mass_is_judged_without_a_ratio(tmp_pat
     path = tmp_path / "r.urdf"
     path.write_text(f'{text}<mass value="50"/>{inertia}</inertial></link>{joints}</robot>', encoding="utf-8")
     assert "mass_neighbours" not in {finding.kind for finding in rd.tools.doctor.check_urdf(path).findings}
+
+
+def test_a_shape_that_covers_a_small_part_of_a_heavy_link_is_no_reason(tmp_path: Path) -> None:
+    """A foot of 0.6 kg with four balls as its contact: 3e5 kg/m³ in these, and an ankle of 0.07 kg before it."""
+    ball = '<collision><origin xyz="{} {} -0.03"/><geometry><sphere radius="0.005"/></geometry></collision>'
+    balls = "".join(ball.format(x, y) for x in (-0.05, 0.12) for y in (-0.03, 0.03))
+    box = '<visual><geometry><box size="0.2 0.08 0.06"/></geometry></visual>'
+    ankle = link("ankle", 0.07, "0 0 0.02", 4e-5, 4e-5, 3e-5)
+    foot = link("foot", 0.6, "0 0 0", 5e-4, 2e-3, 2e-3, box + balls)
+    assert "mass_neighbours" not in {kind for kind, _ in kinds(arm(tmp_path, [LOWER, ankle, foot], [0.2, 0.36, 0.05]))}

@@ -23,10 +23,10 @@ from robot_dyn.tools.export import CSource, c_source
 from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
-from tests.command import run
+from tests.command import ROOT, run
 from tests.long import long
 from tests.promised import check_document
-from tests.tools.export.c_program import HOST, TARGETS, WRITABLE, call, library, self_test, symbols
+from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
 QUICK = (  # a fifth of the catalog: chains, trees, slides, coupled joints
     "cart_pole", "double_pendulum", "flyball_governor", "light_tip", "massless_tip", "mimic_chain", "panda", "pendulum",
@@ -139,6 +139,20 @@ def test_a_result_may_overwrite_an_argument(tmp_path: Path) -> None:
     pointer = x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
     ctypes.CDLL(str(tmp_path / "l.so")).ur5_N(pointer, pointer)
     assert np.allclose(x, expected, rtol=1e-13, atol=1e-13)
+
+
+@needs_cc
+def test_c_of_the_page_compiles(tmp_path: Path) -> None:
+    """The controller of docs/how_to/c_for_a_controller.md, with the plant that it names."""
+    page = (ROOT / "docs" / "how_to" / "c_for_a_controller.md").read_text(encoding="utf-8")
+    gripper = rd.Payload("tool0", 1.0, com=(0.0, 0.0, 0.1))
+    effects = [rd.effects.ViscousFriction(0.3), rd.effects.EffortLimit(150.0)]
+    c_source(rd.Plant(UR5.with_(payload=gripper), effects), ["N", "inverse_dynamics"]).write(tmp_path)
+    blocks = re.findall(r"^```c\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert blocks
+    for block in blocks:
+        (tmp_path / "block.c").write_text(block)
+        call("cc", *STRICT, "-c", tmp_path / "block.c", "-o", tmp_path / "block.o")
 
 
 def test_float_has_no_operation_in_double() -> None:
