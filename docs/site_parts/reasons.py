@@ -33,7 +33,7 @@ EXAMPLES = {
         "remedy": "Rodas5P, softer effects or a larger tolerance",
     },
     Reason.STAGES_NOT_FOUND: {
-        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a "
+        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: use a "
         "smaller step, or a method for stiff systems"
     },
     Reason.EVENTS_ACCUMULATE: {

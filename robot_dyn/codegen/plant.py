@@ -218,7 +218,9 @@ class CompiledPlant(NamesNearest):
     def _bodies(self) -> SymbolicDynamics:
         """Rigid bodies with symbolic parameters."""
         own = [parameter for parameter in self.parameters if parameter.part == ROBOT]
-        return SymbolicDynamics(self.dynamics.robot, own).of(split(self.parameters, self._numbers[1]).get(ROBOT, {}))
+        return SymbolicDynamics(self.dynamics.robot, own).with_parameters(
+            split(self.parameters, self._numbers[1]).get(ROBOT, {})
+        )
 
     @cached_property
     def _symbolic(self) -> Plant:

@@ -106,7 +106,7 @@ class Explanation(Answer):
                 yield f"    as it acts: {'; '.join(effect.coefficients)}"
         if self.absent:
             yield ""
-            yield "not simulated, because it was not named:"
+            yield "not simulated (the setup does not name them):"
             yield f"  {', '.join(self.absent)}"
         if self.absent_of_control:
             yield f"  of the control: {', '.join(self.absent_of_control)}"
@@ -114,7 +114,7 @@ class Explanation(Answer):
             yield from ("", *lines) if lines else ()
         if self.source:
             yield ""
-            yield f"the file of the robot: {abbreviated(self.source)}"
+            yield f"robot file: {abbreviated(self.source)}"
             yield from (f"  {finding}" for finding in self.findings)
 
 

@@ -152,7 +152,7 @@ def arithmetic_of(dtype: DTypeLike | Arithmetic) -> Arithmetic:
     except Exception:  # any error in the conversion of a foreign object
         numpy_dtype = None
     if dtype is None or numpy_dtype is None or numpy_dtype.kind != "f" or numpy_dtype.itemsize < 4:
-        raise QueryError(f"no arithmetic {shown(dtype)}: give float32, float64, np.longdouble or Ball(bits)")
+        raise QueryError(f"dtype {shown(dtype)} is not supported: use float32, float64, np.longdouble or Ball(bits)")
     return Float(numpy_dtype)
 
 

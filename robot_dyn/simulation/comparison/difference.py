@@ -87,9 +87,13 @@ def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
     names = tuple(run.metadata.get("robot", "") for run in (a, b))
     if a.joint_names != b.joint_names:
         both = [f"{name or 'a robot'} ({', '.join(x.joint_names)})" for name, x in zip(names, (a, b), strict=True)]
-        raise QueryError(f"runs of different joints cannot be compared: {both[0]} and {both[1]}; give two of one robot")
+        raise QueryError(
+            f"runs of different joints cannot be compared: {both[0]} and {both[1]}; compare runs of one robot"
+        )
     if all(names) and names[0] != names[1]:
-        raise QueryError(f"runs of different robots, {names[0]} and {names[1]}, cannot be compared; give two of one")
+        raise QueryError(
+            f"runs of different robots, {names[0]} and {names[1]}, cannot be compared; compare runs of one robot"
+        )
     if not (len(a.t) and len(b.t)):
         raise QueryError("a run without samples cannot be compared; simulate it again")
     if max(a.t[0], b.t[0]) > min(a.t[-1], b.t[-1]):

@@ -39,7 +39,9 @@ class Column:
     rises: np.ndarray
 
     @classmethod
-    def of(cls, f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, j: int, here: np.ndarray, most: float) -> Column:
+    def from_function(
+        cls, f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, j: int, here: np.ndarray, most: float
+    ) -> Column:
         """Return the differences by entry j, with steps up to `most` that change it by more than rounding."""
         least = 64 * np.spacing(abs(x[j]))
         steps = np.array([h for h in _STEPS if least <= h <= max(most, _STEPS[-5])])

@@ -188,5 +188,5 @@ def _refusal(best: _Try, requested: float, rtol: float) -> str:
         method = best.trial.statistics.method
         least = f"{method}'s smallest tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
         why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"
-    remedy = f"use accuracy {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "take a shorter run"
+    remedy = f"use accuracy {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "use a shorter run"
     return f"accuracy {requested:.1e} is not attainable: {why}; {remedy}"

@@ -180,7 +180,7 @@ def _gap_columns(effect: Any, n: int, first: int, work: int) -> tuple[Any, ...]:
     """Return joint, entries of y for δ, δ̇, θ̇, the impulse and the work, and B, β and e, of each gap of an effect."""
     joints = np.array(effect.driven(n))
     k = len(joints)
-    numbers = [effect.reflected(n), effect.of("half_gap", n), effect.of("restitution", n)]
+    numbers = [effect.reflected(n), effect.per_joint("half_gap", n), effect.per_joint("restitution", n)]
     rows = [first + i * k + np.arange(k) for i in range(4)]
     return joints, *rows, np.full(k, work), *(np.asarray(values, float) for values in numbers)
 

@@ -50,7 +50,7 @@ class DoubtKind(StrEnum):
     WORK_OF_NO_EFFECT = "work_of_no_effect"
 
 
-_FINER: Part = "take rtol = {smaller_rtol:.0e}", "take step_s = {smaller_step_s:.0e}"
+_FINER: Part = "use rtol = {smaller_rtol:.0e}", "use step_s = {smaller_step_s:.0e}"
 _AT = ", at t = {at:.4g} s"
 _LIMIT: Part = "{tenth:.2g} [rad] or [m], a tenth of the motion", "{limit:.2g} rad or m"
 _SENTENCES: Mapping[DoubtKind, Parts] = {
@@ -98,8 +98,8 @@ _SENTENCES: Mapping[DoubtKind, Parts] = {
 }
 _REMEDIES: Mapping[DoubtKind, Parts] = {  # other kinds: a smaller step or tolerance, if the facts name one
     DoubtKind.NO_ORDER_OF_IMPACTS: ("compare it with step_s / 4, or with method='DOP853'",),
-    DoubtKind.OSCILLATION_DAMPED: ("take shorter steps",),
-    DoubtKind.ROUNDING: ("take a shorter run",),
+    DoubtKind.OSCILLATION_DAMPED: ("use shorter steps",),
+    DoubtKind.ROUNDING: ("use a shorter run",),
 }
 
 

@@ -48,7 +48,7 @@ class Ledger(Value):
         read_only(self)
 
     def __repr__(self) -> str:
-        if not self.known:
+        if not self.is_recorded:
             return "<Ledger: not recorded>"
         worst = f"largest residual {largest(np.abs(self.residual)):.2e} J of {self.exchanged:.3g} J exchanged"
         return f"<Ledger: {worst}; work of {', '.join(self.work) or 'nothing'}>"
@@ -66,7 +66,7 @@ class Ledger(Value):
         return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
 
     @property
-    def known(self) -> bool:
+    def is_recorded(self) -> bool:
         """True if it was recorded: energies or work of rollouts may be nan throughout."""
         return not np.isnan(self.residual).all()
 
@@ -126,5 +126,5 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
         return ""
     doubt = "do not trust the estimate, " if ledger.cause is None or ledger.cause.is_of_steps else ""
     return (
-        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'take a smaller step'}"
+        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'use a smaller step'}"
     )

@@ -315,17 +315,17 @@ def _check_segments(setup: Setup) -> None:
     if size > MOST_BYTES:
         raise QueryError(
             f"a run of {setup.duration_s:g} s with {cut:.3g} ticks and switches takes {gibibytes(size)}, more than "
-            f"{gibibytes(MOST_BYTES)}: take a longer period_s of the controller, or a shorter duration_s"
+            f"{gibibytes(MOST_BYTES)}: use a longer period_s of the controller, or a shorter duration_s"
         )
     if steps(setup) > MOST_STEPS:
         raise QueryError(
             f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
-            f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+            f" more than {MOST_STEPS:g}: use a longer step_s, or a shorter duration_s"
         )
     if setup.duration_s > LONGEST_S:
         raise QueryError(
             f"a run of {setup.duration_s:g} s ends at a time that floats resolve to {ulp(setup.duration_s):.1g} s only:"
-            f" take a shorter duration_s, {LONGEST_S:.2g} s at most"
+            f" use a shorter duration_s, {LONGEST_S:.2g} s at most"
         )
 
 
@@ -379,7 +379,7 @@ def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
 
 def too_large(record: str, size: float, most: float, or_else: str = "") -> QueryError:
     """Return the error for a record of more than `most` bytes."""
-    remedy = f"take a longer record_every_s or a shorter duration_s{or_else}"
+    remedy = f"use a longer record_every_s or a shorter duration_s{or_else}"
     return QueryError(f"recording {record} takes {gibibytes(size)}, more than {gibibytes(most)}: {remedy}")
 
 

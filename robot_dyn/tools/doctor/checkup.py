@@ -86,8 +86,8 @@ class Checkup(Answer):
     def _repr_html_(self) -> str:
         from robot_dyn.foundations import page, table
 
-        rows = ((x.severity.value, x.where, str(x.line or ""), x.what, x.remedy) for x in self.findings)
-        heading = ("", "where", "line", "what", "remedy")
+        rows = ((x.severity.value, x.where, str(x.line or ""), x.message, x.remedy) for x in self.findings)
+        heading = ("", "where", "line", "message", "remedy")
         return page(self.sentence, table(heading, rows, right=("line",)) if self.findings else "")
 
 
@@ -219,7 +219,7 @@ def _examined(
         if conversions:
             document = _rewritten(document, conversions)
     loads = refusal is None and not any(finding.kind == FindingKind.REFUSED for finding in findings)
-    findings = [x if x.line else replace(x, line=written.line(x.where, x.what)) for x in findings]
+    findings = [x if x.line else replace(x, line=written.line(x.where, x.message)) for x in findings]
     repaired = None if document is written or document.text == text else document.text
     return _Examined(loads, _gravest_first(findings), repaired, robot is not None, estimated)
 
@@ -322,7 +322,7 @@ def _assumed(text: str) -> Finding:
 def _reported(text: str, findings: Iterable[Finding]) -> bool:
     """Return True if the check has already reported a finding of the reader, in other words."""
     reported_limits = {finding.where for finding in findings if finding.kind.startswith("limit")}
-    same = {finding.what for finding in findings}
+    same = {finding.message for finding in findings}
     return text.partition(": ")[0] in reported_limits or any(what in text for what in same)
 
 

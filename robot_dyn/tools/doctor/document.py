@@ -77,11 +77,11 @@ class Document:
         """Return the value of an attribute as the file writes it, with its line breaks and references."""
         return self._written[slice(*self._stated[element][0].attributes[key][1])]
 
-    def line(self, where: str, what: str) -> int | None:
+    def line(self, where: str, text: str) -> int | None:
         """Return the line of the link or joint, or of an element in it, to which a refusal refers."""
         for part in self.root.iter("link", "joint"):
             if self.where(part) == where:
-                tag = re.match(r"<(\w+)>", what)
+                tag = re.match(r"<(\w+)>", text)
                 inner = () if tag is None else (*part.iterfind(tag[1]), *part.iterfind(f"inertial/{tag[1]}"))
                 return next(iter(inner), part).sourceline
         return None

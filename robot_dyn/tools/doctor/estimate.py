@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def missing_inertials(
     document: Document,
     description: Description,
-    of: Mapping[str, Shape],
+    shapes: Mapping[str, Shape],
     masses: Masses | None,
     package_dirs: tuple[Path, ...],
 ) -> Iterator[Finding]:
@@ -32,7 +32,7 @@ def missing_inertials(
     if masses is not None:
         shapes, unread = shapes_of_incomplete_links(description, package_dirs, masses.allow_overlap)
         new = {estimate.link: estimate for estimate in estimates(description, shapes, masses, unread)[0]}
-    for name, shape in of.items():
+    for name, shape in shapes.items():
         if name not in new and shape.unit is not None and document.named("link", name).find("inertial") is None:
             yield _finding(
                 document, name, FindingKind.INERTIAL_MISSING,

@@ -315,16 +315,16 @@ def _explained(document: Document, name: str, body: Body, finding: Finding) -> F
     if not candidates:
         return finding
     mistakes = ", or ".join(candidate.mistake for candidate in candidates)
-    what = f"{finding.what}: possible mistake: {mistakes}"
+    message = f"{finding.message}: possible mistake: {mistakes}"
     if len(candidates) > 1:
-        return replace(finding, what=what)
+        return replace(finding, message=message)
     (texts,) = [candidate.texts for candidate in candidates]
     changes = tuple(
         Change(mass if key == "value" else moments, key, text)
         for key, text in texts.items()
         if text != (mass if key == "value" else moments).get(key, "0")
     )
-    return replace(finding, what=what, changes=changes, supposed=True)
+    return replace(finding, message=message, changes=changes, supposed=True)
 
 
 def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
