@@ -24,6 +24,7 @@ MEASURE = {
     "check_urdf",
     "compare",
     "cost",
+    "excite",
     "fastest",
     "from_scene",
     "max_payload",

@@ -37,13 +37,15 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "Stress", "SweepResult",
-    "Trajectory", "WorkPrecision",
+    "Advice", "CFunction", "CSource", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
+    "ExpectedPrecision", "InverseKinematics", "Meaning", "MotorBudget", "Motors", "PathPlan", "Plan", "Proof",
+    "Rollouts", "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State", "StaticEstimate",
+    "Stress", "SweepResult", "SymbolicEquations", "Trajectory", "WorkPrecision",
 }  # fmt: skip
+RESULTS |= {"Cause", "HeldOut", "Identification", "Parameter", "Verdict"}
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
-    "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
+    "Dynamics", "Effect", "EquationOfMotion", "HeldJoint", "Interval", "Mode", "CartesianReference", "ControlLaw",
     "TaskDynamics", "ButcherTableau", "RosenbrockTable", "Surd", "System",
     "RightSide", "FixedStepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
     "GaussLegendre", "Rosenbrock", "MoreauJean",
@@ -57,7 +59,7 @@ FOR_LOOPS = {
 }
 FOR_LOOPS |= {
     "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "penetration", "reversals", "friction",
-    "bounds", "of", "reflected", "drag",
+    "bounds", "per_joint", "reflected", "drag",
 }  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "CarriedPayload.acts": {"t"},
@@ -76,7 +78,17 @@ LAX |= {name: {key for key, each in declared(kind).items() if each.infinite} for
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.step, rd.tools.stress, rd.tools.sweeps)
+TOOLS = (
+    rd.tools.doctor,
+    rd.tools.export,
+    rd.tools.identify,
+    rd.tools.motors,
+    rd.tools.proof,
+    rd.tools.step,
+    rd.tools.stress,
+    rd.tools.sweeps,
+    rd.tools.symbols,
+)
 ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
@@ -131,6 +143,12 @@ def examples(folder: Path) -> dict[str, Example]:
     table, motors = folder / "samples.csv", folder / "motors.csv"
     motors.write_text("joint,peak [N m]\nslide,50\n")
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
+    excited = rd.tools.identify.excite(robot, 5.0, limits={"velocity": 2.0}, starts=1, compare_longer=False)
+    states = np.random.default_rng(0).uniform(-1, 1, (12, 2))
+    t = np.linspace(0.0, 5.0, 1001)
+    moved, *rates = excited.reference.at(t)
+    current = robot.inverse_dynamics(moved, *rates) + rates[0] + np.random.default_rng(0).normal(0, 0.1, (1001, 2))
+    log = {"t": t, "q": moved, "current": current}
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
     arms = rd.tools.step.Stepper(plant, 2)
@@ -207,7 +225,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(plant.at, t=0.1),
         call(plant.actuation, u=u),
         call(plant.forward_dynamics, q=q, v=v, u=u, t=0.1),
-        call(plant.held, q=q, v=v, u=u, t=0.1),
+        call(plant.held_joints, q=q, v=v, u=u, t=0.1),
         call(plant.inverse_dynamics, q=q, v=v, a=u, t=0.1),
         call(plant.torque, q=q, v=v, t=0.1),
         call(rd.Robot, description=robot.description, edits=robot.edits),
@@ -216,6 +234,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.Robot.from_text, urdf=robot.description.xml.decode(), source="arm"),
         call(robot.to_urdf, path=folder / "written.urdf"),
         call(robot.random_configuration, rng=np.random.default_rng(0)),
+        call(robot.attach, gripper=rd.load("planar_2r"), frame="pole", prefix="g_", xyz=(0, 0.1, 0), rpy=(0.3, 0, 0)),
         call(robot.with_, gravity=(1.0, 0.0, -9.0), lock={"hinge": 0.1}, payload=rd.Payload("pole", 1.0),
             armature=0.1, mass_scale=1.1),
         call(several.outcome, run=1),
@@ -233,7 +252,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.certify, robot=robot, q=q, v=v, a=u, tau=u, samples=100, seed=3, repeats=1,
             on_progress=lambda part, what: None),
         call(rd.accuracy.warn_below, robot=robot, digits=12.0),
-        call(certified.of, quantity="M", implementation="Pinocchio"),
+        call(certified.digits_of, quantity="M", implementation="Pinocchio"),
         call(certified.save, path=folder / "digits.csv", theme="dark"),
         call(priced.save, path=folder / "cost.csv", theme="dark"),
         call(measured.save, path=folder / "work.csv", theme="dark"),
@@ -248,8 +267,8 @@ def examples(folder: Path) -> dict[str, Example]:
             inertia_unit="kg mm2", xacro=None),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
-        call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), least=0.5, above=0.5,
-            infinite=False, elsewhere=0.5, stated="friction", can_vary=True),
+        call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), minimum=0.5, exclusive_minimum=0.5,
+            infinite=False, fill_value=0.5, stated="friction", can_vary=True),
         call(rd.compare, robot=robot, samples=1, seed=3, tolerance=1e-9, on_sample=print_nothing),
         call(rd.euler_lagrange, kinetic=lambda t, q, v: v[0] ** 2 / 2, potential=lambda t, q: ca.cos(q[0]), n=1),
         call(rd.control.from_samples, arm=robot, source={"slide": [0.1, 0.2, 0.3], "hinge": [0.1, 0.3, 0.4]},
@@ -273,6 +292,21 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
+        call(rd.tools.export.c_source, arm_or_plant=robot, quantities=["N"], dtype="float32", name="arm"),
+        call(rd.tools.export.c_source(robot, ["N"]).write, folder=folder / "c", force=True),
+        call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
+        call(rd.tools.export.parameter_values, plant=plant),
+        call(rd.tools.symbols.symbols, arm=robot, letters="base"),
+        call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
+        call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
+            tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),
+        call(rd.tools.identify.Poses, q=states, tau=states, approach=np.ones((12, 2))),
+        call(rd.tools.identify.static, arm=robot, poses=rd.tools.identify.Poses(states, robot.N(states)), friction=0.5,
+            noise=0.1, tilt=False),
+        call(excited.save, path=folder / "excitation.csv"),
+        call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, gains=1.0,
+            effects=[rd.effects.ViscousFriction(0.1)], cutoff_hz=6.0, slow=0.05),
+        call(rd.tools.identify.identify(robot, log, gains=1.0).save, path=folder / "arm.urdf"),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),
         call(rd.tools.motors.budget, motion=rd.control.quintic(q, v, 1.0), plant=plant, payload=rd.Payload("pole",
@@ -285,7 +319,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.quintic, q0=q, q1=v, duration_s=1.0, start_s=0.1, v0=0.1, v1=u, a0=u, a1=0.0),
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
         call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
-        call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
+        call(rd.rollouts, system=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
         call(rd.tools.step.Stepper, plant=plant, n=2, period_s=0.02, controller=sampled, step_s=2e-3, method="RK4",
             vary={"kp": [8.0, 9.0]}, uncut=True, ledger=True, threads=1),
@@ -302,24 +336,24 @@ def examples(folder: Path) -> dict[str, Example]:
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),
         call(swept.sweep.values, start=0, stop=3),
         call(swept.save, path=folder / "rows.csv", force=True),
-        call(swept.mean, figure="end", level=0.9, given="finished"),
-        call(swept.probability, event="end > 0.1", level=0.9, given="finished"),
+        call(swept.mean, figure="end", level=0.9, condition="finished"),
+        call(swept.probability, event="end > 0.1", level=0.9, condition="finished"),
         call(swept.quantiles, figure="end", probabilities=[0.5], level=0.9),
         call(swept.reasons),
         call(swept.run, i=3),
         call(swept.setup_of, i=3),
-        call(swept.sensitivity, figure="end", level=0.9, given="finished"),
+        call(swept.sensitivity, figure="end", level=0.9, condition="finished"),
         call(swept.verify),
-        call(swept.worst, figure="end", count=2, given="finished"),
+        call(swept.worst, figure="end", count=2, condition="finished"),
         call(rd.tools.sweeps.choice, values=[1.0, 2.0]),
-        call(rd.tools.sweeps.final, of_what="q", joint="slide"),
+        call(rd.tools.sweeps.final, quantity="q", joint="slide"),
         call(rd.tools.sweeps.from_scene, path=of_sweep, vary={}, figures={"end": rd.tools.sweeps.final("q",
             "slide")}),
         call(rd.control.orientation_error, R_desired=eye, R=eye),
         call(rd.control.rotation_vector, R=eye),
         call(rd.tools.sweeps.lognormal, median=1.0, sigma_of_log=0.1),
         call(rd.tools.sweeps.normal, mean=1.0, sd=0.1),
-        call(rd.tools.sweeps.peak, of_what="v", joint="slide"),
+        call(rd.tools.sweeps.peak, quantity="v", joint="slide"),
         call(rd.tools.sweeps.read_sweep, folder=folder / "sweep", scene=of_sweep, figures={}),
         call(rd.tools.sweeps.rms_tracking_error, joint="slide"),
         call(rd.tools.sweeps.run, sweep=swept.sweep, folder=folder / "sweep", threads=1, chunk=16,
@@ -328,18 +362,18 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.sweeps.uniform, low=0.0, high=1.0),
         call(run.save, path=folder / "again"),
         call(rd.show, robot=robot, q=q, package_dirs=[folder], inertia=False),
-        call(rd.simulate, what=plant, on_progress=lambda t: None, q0=q, duration_s=0.01),
+        call(rd.simulate, system=plant, on_progress=lambda t: None, q0=q, duration_s=0.01),
         call(rd.control.task_dynamics, dynamics=robot, q=q, v=v, frame="pole", rows=(0,), threshold=0.01),
         call(rd.why, plant=plant, q=q, v=v, a=u, joint="hinge", t=0.1),
-        call(rd.explain, what=setup),
+        call(rd.explain, system=setup),
         call(rd.info, robot=robot),
-        call(rd.parameters, what=setup),
-        call(rd.advise, what=plant, q0=q, v0=v, duration_s=0.01),
-        call(priced.of, what="gravity"),
-        call(rd.accuracy.cost, what=setup, q0=q, v0=v, budget_s=1e-9, repeats=1, on_progress=print_nothing),
+        call(rd.parameters, system=setup),
+        call(rd.advise, system=plant, q0=q, v0=v, duration_s=0.01),
+        call(priced.comparison, name="gravity"),
+        call(rd.accuracy.cost, system=setup, q0=q, v0=v, budget_s=1e-9, repeats=1, on_progress=print_nothing),
         call(measured.digits, error=1e-6),
         call(measured.sentence_of, digits=6),
-        call(rd.accuracy.work_precision, what=replace(setup, engine="interpreted"), q0=q, v0=v, duration_s=0.01,
+        call(rd.accuracy.work_precision, system=replace(setup, engine="interpreted"), q0=q, v0=v, duration_s=0.01,
             methods=["RK4"], peers=False, budget_s=2.0, repeats=1, on_progress=print_nothing),
         call(rd.control.via_points, times_s=[0.0, 0.5, 1.0], points=points, kind="cubic"),
     ]  # fmt: skip

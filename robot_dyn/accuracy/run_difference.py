@@ -111,7 +111,7 @@ class RunDifference(Result):
 
     @reported
     def is_conclusive(self) -> bool:
-        """Return True if half of the time or more was compared; otherwise no run is reported equal."""
+        """True if half of the time or more was compared; otherwise no run is reported equal."""
         return self.fraction >= HALF
 
     @property
@@ -134,7 +134,7 @@ class RunDifference(Result):
             rows = tuple((setting.name, setting.a, setting.b) for setting in self.settings)
             yield Table(("setting", "a", "b"), rows, wrap=True)
         else:
-            yield "no setting differs"
+            yield "all settings are equal"
         yield ""
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, TypedDict
 
 import numpy as np
 
+from robot_dyn.codegen.store.cache import Entry
 from robot_dyn.cross_check.agreement import Comparison, marked
 from robot_dyn.cross_check.compare import compare
 from robot_dyn.effects.plant_state import PlantState, plant_state
@@ -19,17 +20,103 @@ from robot_dyn.queries.units import numbers_row
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.ledger import largest
+from robot_dyn.simulation.results.statistics import Accuracy, Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
 
 Document = dict[str, Any]
 
 
-def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Document:
+class ComparisonDocument(TypedDict):
+    """Comparisons of several robots.
+
+    Attributes:
+        ok: True if the implementations agree for every robot.
+        robots: Comparison of each robot, by name.
+        refused: With `--all`, reason for each robot that does not load, by name.
+    """
+
+    ok: bool
+    robots: dict[str, Comparison]
+    refused: dict[str, str]
+
+
+def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> ComparisonDocument:
     """Return the comparisons by name, and the refused robots."""
     return {"ok": all(result.ok for _, result in results), "robots": dict(results), "refused": refused}
 
 
-def run(trajectory: Trajectory) -> Document:
+class CacheDocument(TypedDict):
+    """The cache of compiled kernels.
+
+    Attributes:
+        folder: Folder of the kernels; None if there is no cache.
+        removed: Number of kernels removed by `--clear`.
+        bytes: Total size, in [bytes].
+        kernels: The kernels.
+    """
+
+    folder: str | None
+    removed: int
+    bytes: int
+    kernels: list[Entry]
+
+
+class RunDocument(TypedDict):
+    """Outcome, cost and accuracy of a run.
+
+    Attributes:
+        ending: "finished", "diverged" or "stopped".
+        t: Time of the end, in [s].
+        reason: Reason of the end, see [why did my run end](../explanation/why_did_my_run_end.md).
+        joint: Joint that the reason names; empty if there is none.
+        facts: Numbers and names that explain the reason.
+        text: The reason in a sentence, with a remedy; empty if the run reached its duration.
+        samples: Number of samples.
+        acting: Gravity, payloads, effects, limits and control, in words; None if the run file lacks them.
+        joints: Names of the joints.
+        q, v: State at the end.
+        work: Work of the control and of each effect without a potential, in [J], by name.
+        ledger_residual: Largest unexplained energy, in [J].
+        ledger_closure: Largest unexplained energy, as a fraction of the energy exchanged.
+        ledger_doubt: Reason why the ledger does not close; None if it closes.
+        error_largest: Largest estimated error of q; None without an estimate, or if it ends before the run.
+        error_until_s: Time until which the estimate holds, in [s]; None without an estimate.
+        error_verdict: "order seen", "bounded" or "none"; None without an estimate.
+        error_doubts: Reasons why the estimate ends early, and why the order does not show.
+        rms_tracking_error: Root mean square of q_d − q, or of the frame's distance in [m]; None without a reference.
+        accuracy: The requested accuracy and its cost; None if none was requested.
+        remarks: Observations at the ends of all steps.
+        extremes: "least" and "largest" values of "q", "v" and "u", by joint; None if not observed.
+        statistics: Steps, evaluations and times.
+    """
+
+    ending: str
+    t: float
+    reason: str
+    joint: str
+    facts: Mapping[str, object]
+    text: str
+    samples: int
+    acting: tuple[str, ...] | None
+    joints: tuple[str, ...]
+    q: np.ndarray
+    v: np.ndarray
+    work: dict[str, float]
+    ledger_residual: float
+    ledger_closure: float
+    ledger_doubt: Doubt | None
+    error_largest: float | None
+    error_until_s: float | None
+    error_verdict: str | None
+    error_doubts: list[Doubt]
+    rms_tracking_error: float | None
+    accuracy: Accuracy | None
+    remarks: list[Remark]
+    extremes: dict[str, dict[str, np.ndarray]] | None
+    statistics: Statistics
+
+
+def run(trajectory: Trajectory) -> RunDocument:
     """Return the outcome, the cost and the accuracy of a run; samples are in its run file."""
     error, outcome = trajectory.error, trajectory.outcome
     return {
@@ -47,27 +134,17 @@ def run(trajectory: Trajectory) -> Document:
         "work": {name: work[-1] for name, work in trajectory.ledger.work.items()},
         "ledger_residual": largest(np.abs(trajectory.ledger.residual)),
         "ledger_closure": trajectory.ledger.closure,
-        "ledger_doubt": None if trajectory.ledger.cause is None else _doubt(trajectory.ledger.cause),
+        "ledger_doubt": trajectory.ledger.cause,
         "error_largest": None if error is None else error.largest,
         "error_until_s": None if error is None else error.until_s,
         "error_verdict": None if error is None else error.verdict,
-        "error_doubts": [] if error is None else [_doubt(x) for x in (error.ends_early, error.no_order) if x],
+        "error_doubts": [] if error is None else [x for x in (error.ends_early, error.no_order) if x],
         "rms_tracking_error": trajectory.rms_tracking_error,
         "accuracy": trajectory.accuracy,
-        "remarks": [_remark(remark) for remark in trajectory.remarks],
+        "remarks": [*trajectory.remarks],
         "extremes": _extremes(trajectory),
         "statistics": trajectory.statistics,
     }
-
-
-def _doubt(doubt: Doubt) -> Document:
-    """Return a doubt and its sentences."""
-    return vars(doubt) | {"text": doubt.text, "remedy": doubt.remedy}
-
-
-def _remark(remark: Remark) -> Document:
-    """A remark and its sentences."""
-    return vars(remark) | {"text": remark.text, "remedy": remark.remedy}
 
 
 def _extremes(trajectory: Trajectory) -> Document | None:
@@ -101,7 +178,7 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
     yield from (f"{name} refused: {why}" for name, why in refused.items())
     yield agreed
     if results:
-        name, result = max(results, key=lambda pair: pair[1].worst.share)
+        name, result = max(results, key=lambda pair: pair[1].worst.tolerance_fraction)
         worst = result.worst
         yield f"worst: {name}, {worst.quantity}, {worst.error:.2e} of {worst.tolerance:.1e} allowed, at {worst.entry}"
         if not result.ok:
@@ -132,7 +209,7 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
         quantity = QUANTITIES[choice("quantity", name, QUANTITIES)]
         frames = [frame] if quantity.framed and frame else []
         if quantity.framed and not frames:
-            raise QueryError(f"{name} is a quantity of a frame: give --frame LINK")
+            raise QueryError(f"{name} refers to a frame: add --frame LINK")
         answers[name] = quantity.ask(state.plant.dynamics, vars(state), *frames)
     return answers
 

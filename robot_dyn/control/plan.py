@@ -49,7 +49,7 @@ class Plan(Answer, Value):
 
     @reported
     def duration_s(self) -> float:
-        """Return the time from the first to the last break, in [s]."""
+        """Time from the first to the last break, in [s]."""
         return self.reference.end_s - self.reference.start_s
 
     @cached_property

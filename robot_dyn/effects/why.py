@@ -28,7 +28,14 @@ _CAUSES: tuple[str, ...] = "inertia", "Coriolis", "gravity", "effect"
 @final
 @dataclass(frozen=True)
 class Share:
-    """The contribution of one link, or of the armature, to a joint's torque, in [N m] or [N]."""
+    """The contribution of one link, or of the armature, to a joint's torque, in [N m] or [N].
+
+    Attributes:
+        source: Name of the link, or "(armature)".
+        inertia: Part of M a.
+        coriolis: Part of C v.
+        gravity: Part of the torque of gravity.
+    """
 
     source: str
     inertia: float

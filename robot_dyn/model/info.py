@@ -21,7 +21,18 @@ _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", 
 @final
 @dataclass(frozen=True)
 class Joint:
-    """A joint: limits in [rad] or [m], [N m] or [N] and per second; unstated values are infinite or 0."""
+    """A joint of the robot.
+
+    Attributes:
+        name: Name of the joint.
+        kind: "revolute", "continuous" or "prismatic".
+        lower, upper: Position limits, in [rad] or [m]; infinite if not stated.
+        effort_limit: Largest torque or force, in [N m] or [N]; infinite if not stated.
+        velocity_limit: Largest velocity, in [rad/s] or [m/s]; infinite if not stated.
+        damping: Coefficient of viscous friction, in [N m s/rad] or [N s/m]; 0 if not stated.
+        friction: Torque or force of dry friction, in [N m] or [N]; 0 if not stated.
+        armature: Reflected rotor inertia of the robot, in [kg m²] or [kg].
+    """
 
     name: str
     kind: str
@@ -37,7 +48,14 @@ class Joint:
 @final
 @dataclass(frozen=True)
 class Coupling:
-    """A joint that follows another one: q = multiplier · q_source + offset."""
+    """A joint that follows another one: q = multiplier · q_source + offset.
+
+    Attributes:
+        joint: Name of the follower.
+        source: Name of the joint that it follows.
+        multiplier: Ratio of the positions.
+        offset: Position of the follower where the source is at 0, in [rad] or [m].
+    """
 
     joint: str
     source: str
@@ -58,7 +76,7 @@ class Info(Answer):
         gravity: Acceleration of free fall in base axes, in [m/s²].
         gravity_acts: True if gravity exerts a torque on a joint at some position.
         gravity_free: Joints on which gravity exerts no torque at any position, as the robot is mounted.
-        balanced: Those on which it exerts none in any mounting.
+        balanced: Joints on which gravity exerts no torque in any mounting.
         file_order: Independent joints in the order of the file.
         joints: Independent joints, in the order of q.
         couplings: Joints that follow another one, as stated by the file.

@@ -31,7 +31,7 @@ class Result(Answer):
 
     @reported
     def interrupted(self) -> bool:
-        """Return True if the user interrupted the study."""
+        """True if the user interrupted the study."""
         return INTERRUPTED in self.left_out
 
     @property

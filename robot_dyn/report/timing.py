@@ -30,17 +30,17 @@ class Repeated:
 
     @reported
     def time_s(self) -> float:
-        """Return the smallest time, in [s]; nan if it was not timed."""
+        """Smallest time, in [s]; nan if it was not timed."""
         return min(self.times, default=nan)
 
     @reported
     def repeats(self) -> int:
-        """Return the number of turns."""
+        """Number of turns."""
         return len(self.times)
 
     @reported
     def repeatable(self) -> bool:
-        """Return True if there were at least five turns whose two smallest times differ by at most 5 %."""
+        """True if there were at least five turns whose two smallest times differ by at most 5 %."""
         return repeatable(self.times)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robot_dyn.tools import sweeps as sw
 from tests import command
-from tests.cli.test_command_documents import promised
+from tests.promised import check_document
 from tests.tools.sweeps.swept import SCENE, scene
 
 
@@ -26,7 +26,7 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
     assert sw.read_sweep(out).sweep.samples == sw.samples("q", "u", every=48)
     again = command.run("sweep", "run", str(out), "--json", "--probability", "failed")
     found = json.loads(again.stdout)
-    assert found.keys() == promised("sweep SCENE").keys()
+    check_document("sweep", found)
     assert found["status"] == {"runs": 96, "chunks": 2, "missing": 0}
     assert found["specification"]["design"] == "latin" and found["probabilities"]["failed"]["estimate"] == 0.0
     assert "SHA-256" in command.run("sweep", "verify", str(out)).stdout

@@ -15,7 +15,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import UNREPORTED, json_text, plain, reported
 from robot_dyn.report import Result, ResultError
 from robot_dyn.report.save import kinds
-from tests.cli.test_command_documents import names, promised
+from tests.promised import check_document
 
 
 class Colour(Enum):
@@ -90,6 +90,4 @@ def test_each_drawing_is_of_a_result_with_a_table() -> None:
 
 def test_advice_has_the_keys_that_are_promised() -> None:
     made = plain(rd.advise(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.1, method="RK4")))
-    keys = promised("advise")
-    assert made.keys() == keys.keys()
-    assert made["fastest"].keys() == names(keys["fastest"])
+    check_document("advise", made)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot_dyn.cli.application import FILES, command
 from robot_dyn.cli.options import Json
 from robot_dyn.cli.terminal import show
 from robot_dyn.foundations.answer import Table
+
+if TYPE_CHECKING:
+    from robot_dyn.cli.report import CacheDocument
 
 
 @command(FILES)
@@ -24,7 +27,7 @@ def cache(clear: bool = False, as_json: Json = False) -> None:
     store = default_store()
     removed = store.clear() if store and clear else 0
     kernels = list(store.entries()) if store else []
-    answer = {
+    answer: CacheDocument = {
         "folder": str(store.folder) if store else None,
         "removed": removed,
         "bytes": sum(kernel.size for kernel in kernels),
@@ -33,7 +36,7 @@ def cache(clear: bool = False, as_json: Json = False) -> None:
     show([*_lines(answer)], as_json=as_json, document=answer)
 
 
-def _lines(answer: dict[str, Any]) -> Iterator[Any]:
+def _lines(answer: CacheDocument) -> Iterator[Any]:
     """The answer as text."""
     if answer["folder"] is None:
         yield "no cache: compiled kernels are not stored"

@@ -24,7 +24,12 @@ _TEXTS = {"frame": "frame of the control", "right_angles": "right angles, in mac
 @final
 @dataclass(frozen=True)
 class DifferingSetting:
-    """A setting and its value in each of two runs; "—" if a run has none."""
+    """A setting that differs between two runs.
+
+    Attributes:
+        name: Name of the setting.
+        a, b: Values in the two runs, as texts; "—" if a run has none.
+    """
 
     name: str
     a: str

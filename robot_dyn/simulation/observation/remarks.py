@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple, final
 
+from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.sentences import Facts, Parts, prefixed, sentence
 from robot_dyn.simulation.dynamics.fastest_motion import MOTION
 
@@ -20,19 +21,48 @@ class RemarkKind(StrEnum):
     """Subject of a remark."""
 
     CHATTER = "chatter"
+    """The actuation reverses at ten or more ticks in a row; `value` is half of the change between two ticks."""
     EFFORT_REACHED = "effort_limit_reached"
+    """An effort limit of the plant or of the controller cuts the actuation."""
     STOP_REACHED = "joint_stop_reached"
+    """The joint touches a stop of the plant."""
     BEYOND = "beyond_limit_of_file"
+    """A limit of position, velocity or effort in the file is exceeded; the plant does not enforce it."""
     COARSE = "record_too_coarse"
+    """Between samples the quantity leaves the range of its neighbouring samples by more than a tenth of its range;
+    `limit` is the value that the samples show."""
     GAINS = "dissipative_effect_gains"
+    """An effect declared as dissipative does positive work; `joint` is the effect, `value` its largest power, in
+    [W]."""
     CREEPS = "regularised_friction_creeps"
+    """A joint creeps in the last tenth of the run under a load that dry friction would hold; `value` is its
+    velocity."""
     ACCUMULATE = "events_accumulate"
+    """Mode changes accumulate and the run continues by time stepping; `joint` is the last one that changed, `value` the
+    largest velocity there."""
     STIFF = "steps_bounded_by_stability"
+    """Stability limits more than a thousand steps of an explicit method; `value` is the fastest decay, in [1/s],
+    `joint` its main joint, the fact `source` the effect."""
     TOO_LONG = "step_too_long"
+    """Linearised about the start, a fixed step is unstable; and the run diverges, reaches an implausible speed, or its
+    error estimate ends early. `value` is the step, `limit` the longest stable one, in [s]; `joint` is the main joint of
+    the fastest motion, the fact `source` the effect."""
     UNSTABLE = "control_loop_unstable"
+    """Linearised about start, middle or end, deviations grow because of the control; `joint` is the main joint.
+
+    In a sampled loop they grow at least twice as fast as under continuous control; `value` is the growth in a period,
+    `limit` is 1. In a continuous loop of a run that diverged or reached an implausible speed, they grow twice as fast
+    as with constant actuation; `value` is the growth in [1/s], `limit` is 0.
+    """
     DAMPED = "task_damped"
+    """Operational-space control damps its task; `joint` is the frame, `value` the smallest eigenvalue of J M⁻¹ Jᵀ,
+    `limit` the threshold of damping."""
     JUMPS = "reference_jumps"
+    """A moving reference does not start at the position or velocity of the joint; `value` is the reference, `limit` the
+    state."""
     HELD = "held_while_reference_moves"
+    """Dry friction holds the joint at every step while its reference moves; `value` is its position, `limit` the motion
+    of the reference."""
 
 
 class Sentence(NamedTuple):
@@ -158,7 +188,7 @@ class Remark:
     """An observation about one joint.
 
     Attributes:
-        kind: Its subject.
+        kind: Subject of the remark.
         joint: Name of the joint, or of the effect or frame that it concerns.
         quantity: "q", "v", "u" or "power": the quantity of value and limit.
         start_s: Time of its start, in [s].
@@ -194,15 +224,18 @@ class Remark:
         limit = {} if self.limit is None else {"limit": self.limit, "bound": abs(self.limit)}
         return own | limit | self.facts
 
-    @property
+    @reported
     def text(self) -> str:
         """Joint, value and time in a sentence."""
         return sentence(_SENTENCES[self.kind].text, self.fields)
 
-    @property
+    @reported
     def remedy(self) -> str:
         """The remedy, the same for all remarks of a kind in a run; empty if there is none."""
         return sentence(_SENTENCES[self.kind].remedy, self.fields)
+
+    def __str__(self) -> str:
+        return _line(self.kind, [self])
 
 
 def line_parts(kind: RemarkKind) -> Parts:

@@ -28,8 +28,9 @@ class Difference(Value):
 
     Attributes:
         name: Name of the quantity.
-        unit: Its unit.
-        median, largest: Over the compared runs; infinite for a run that has a value in one way only.
+        unit: Unit of the quantity.
+        median, largest: Median and largest difference over the compared runs; infinite for a run that has a value in
+            one way only.
     """
 
     name: str

@@ -75,12 +75,12 @@ class JointBudget:
 
     @reported
     def headroom(self) -> dict[str, float]:
-        """Return the unused fraction of each limit; 1 for unknown limits, negative for exceeded ones."""
+        """Unused fraction of each limit; 1 for unknown limits, negative for exceeded ones."""
         return {kind: 1 - used for kind, used in self.shares.items()}
 
     @reported
     def too_small(self) -> tuple[str, ...]:
-        """Return the limits that are exceeded by more than a thousandth: "peak", "continuous" or "speed".
+        """Limits that are exceeded by more than a thousandth: "peak", "continuous" or "speed".
 
         A peak torque at which the actuation was cut is included.
         """

@@ -44,7 +44,7 @@ class LargestPayload(Answer):
         mass: The mass, in [kg], in addition to the arm's payloads; None if no mass fits, inf if no known limit bounds
             it.
         least: The smallest mass that fits, in [kg]: 0, unless the arm needs a counterweight.
-        joint: The limiting joint.
+        joint: The limiting joint; empty if no known limit bounds the mass.
         limit: The limit: "peak torque", "continuous torque", "break-away torque" or "speed".
         at_s: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion.
         largest_share: Largest share of a torque limit with this mass, by inverse dynamics.
