@@ -228,6 +228,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.Robot.from_text, urdf=robot.description.xml.decode(), source="arm"),
         call(robot.to_urdf, path=folder / "written.urdf"),
         call(robot.random_configuration, rng=np.random.default_rng(0)),
+        call(robot.attach, gripper=rd.load("planar_2r"), frame="pole", prefix="g_", xyz=(0, 0.1, 0), rpy=(0.3, 0, 0)),
         call(robot.with_, gravity=(1.0, 0.0, -9.0), lock={"hinge": 0.1}, payload=rd.Payload("pole", 1.0),
             armature=0.1, mass_scale=1.1),
         call(several.outcome, run=1),

@@ -41,3 +41,7 @@ from robot_dyn.control.extremes import extreme_values as extreme_values
 from robot_dyn.control.operational_space import POSE as POSE
 from robot_dyn.control.operational_space import POSITION as POSITION
 from robot_dyn.control.reference import polynomial as polynomial
+from robot_dyn.control.samples.findings import refuse_other_units as refuse_other_units
+from robot_dyn.control.samples.recorded import recorded as recorded
+from robot_dyn.control.samples.sources import table_of as table_of
+from robot_dyn.control.samples.table import name_of as name_of

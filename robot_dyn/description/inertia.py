@@ -122,11 +122,11 @@ def implausibility(mass: float, com: np.ndarray, inertia: np.ndarray) -> str | N
     """
     I1, I2, I3 = np.linalg.eigvalsh(inertia)
     slack = _SLACK * max(abs(I1), abs(I3)) + _LEVER_SLACK * abs(mass) * max(1.0, np.dot(com, com))
-    moments = f"principal moments {I1:.3g}, {I2:.3g}, {I3:.3g} kg m²"
+    moments = f"one of the principal moments {I1:.3g}, {I2:.3g}, {I3:.3g} kg m²"
     if mass < 0:
         return f"its mass is {mass:.3g} kg"
     if -slack > I1:
-        return f"its inertia is indefinite ({moments})"
+        return f"its inertia is indefinite: {moments} is negative"
     if I3 - slack > I1 + I2:
-        return f"its inertia breaks the triangle inequality ({moments})"
+        return f"its inertia breaks the triangle inequality: {moments} exceeds the sum of the others"
     return None

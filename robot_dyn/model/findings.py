@@ -62,7 +62,7 @@ def impossible_inertias(robot: Structure) -> Iterator[str]:
     """Report moving links, before merging, with impossible mass and moments."""
     for name, link in robot.links.items():
         if name not in robot.base and (why := _why_impossible(link)):
-            yield f"link {name!r}: {why}; correct the inertia of this link"
+            yield f"link {name!r}: {why}; correct the inertia of this link: its numbers, their order or signs"
 
 
 def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:

@@ -22,6 +22,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
+from robot_dyn.description.attachment import attached, attached_edits
 from robot_dyn.description.coordinate_limits import CoordinateLimit, position_limits, speed_limits
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
@@ -47,7 +48,7 @@ from robot_dyn.foundations.errors import (
     RobotDynError,
     announce,
 )
-from robot_dyn.foundations.validate import JointValues, function, instance, is_moderate, is_plain, is_state
+from robot_dyn.foundations.validate import JointValues, function, instance, is_moderate, is_plain, is_state, numbers
 from robot_dyn.foundations.values import Caching, OnFirstUse
 from robot_dyn.model.calls import Scratch
 from robot_dyn.model.conditioning import LEAST_DIGITS
@@ -409,6 +410,31 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             remedy = "give its direction in base axes, or (0, 0, 0)"
             warnings.warn(f"{robot.name}: {no_torque(gravity)}; {remedy}", ModelWarning, stacklevel=2)
         return robot if self.answer_check is None else replace(robot, answer_check=self.answer_check)
+
+    def attach(
+        self, gripper: Robot, *, frame: str, prefix: str = "", xyz: ArrayLike = (0.0, 0.0, 0.0),
+        rpy: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Robot:  # fmt: skip
+        """Return this arm with a gripper, whose root is fixed to a link of the arm.
+
+        Edits of both are kept. The joints of the gripper have its names with the prefix; `joint_names` has their order.
+
+        Args:
+            gripper: A robot with a fixed base, with any number of joints, for example from `rd.load("gripper.urdf")`.
+            frame: Link of the arm that carries it, for example "tool0".
+            prefix: Text before the names of links and joints of the gripper, for example "g_".
+            xyz: Position of the gripper's root in the frame, (3,) in [m].
+            rpy: Its orientation there as roll, pitch and yaw, as in a URDF, (3,) in [rad].
+
+        Raises:
+            EditError: If there is no such link, a name occurs in both robots, the base of the gripper moves, or gravity
+                of the gripper was changed.
+        """
+        instance("gripper", gripper, Robot, "give a robot, for example rd.load('gripper.urdf')", error=EditError)
+        place = (numbers(name, value, (3,), error=EditError) for name, value in (("xyz", xyz), ("rpy", rpy)))
+        description = attached(self.description, gripper.description, frame, prefix, *place)
+        edits = attached_edits(self.edits, gripper.edits, gripper.description, prefix)
+        return Robot(description, edits, self.answer_check or gripper.answer_check)
 
     def to_urdf(self, path: str | Path) -> Path:
         """Write the robot with its edits as a URDF; an existing file is replaced.

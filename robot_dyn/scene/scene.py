@@ -26,7 +26,7 @@ from robot_dyn.scene.declared import callable_part
 from robot_dyn.scene.effects import ACTING, BY_KIND, EDITS, AnyEffect, DeclaredEffect, Edit, bare
 from robot_dyn.scene.messages import line, named_part, part, validation_message
 from robot_dyn.scene.references import AnyReference, Circle, Hold, Line, Sampled, ViaPoints
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, one_of, per_joint, wrong_key
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, Vector3, one_of, per_joint, wrong_key
 from robot_dyn.simulation.results.run_file import RUN
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
@@ -60,6 +60,27 @@ class Loading(Part):
         )  # fmt: skip
 
 
+class Attachment(Part):
+    """A gripper fastened to a link of the arm; it is a robot with any number of joints."""
+
+    robot: str
+    """Name of a robot of the catalog, or path of a URDF or MJCF, relative to the folder of the scene."""
+    frame: str
+    """Link of the arm that carries it."""
+    prefix: str = ""
+    """Text before the names of its links and joints."""
+    xyz_m: Vector3 = (0.0, 0.0, 0.0)
+    """Position of its root in the frame."""
+    rpy_rad: Vector3 = (0.0, 0.0, 0.0)
+    """Orientation of its root in the frame: roll, pitch and yaw, as in a URDF."""
+    load: Loading = Loading()
+    """Options for reading its file."""
+
+    def attach(self, arm: Robot, gripper: Robot) -> Robot:
+        """Return the arm with the gripper."""
+        return arm.attach(gripper, frame=self.frame, prefix=self.prefix, xyz=self.xyz_m, rpy=self.rpy_rad)
+
+
 class Start(Part):
     """The state at the start; 0 by default."""
 
@@ -82,6 +103,8 @@ class Scene(Part):
     """Name of a robot of the catalog, or path of a URDF or MJCF, relative to the folder of the scene."""
     load: Loading = Loading()
     """Options for reading the robot's file; unchanged by default."""
+    attach: tuple[Attachment, ...] = ()
+    """Grippers on the arm; none by default."""
     duration_s: Positive
     """Length of the run."""
     method: Annotated[str, AfterValidator(_known_method)] = AUTO
@@ -146,8 +169,10 @@ class Scene(Part):
     def setup(self, folder: Path, metadata: dict[str, str]) -> Setup:
         """Return the setup of the scene; paths are relative to `folder`."""
         with part("robot"):
-            file = folder / self.robot
-            loaded = self.load.robot(file if os.path.isfile(file) else self.robot)
+            loaded = self.load.robot(_path_or_name(folder, self.robot))
+        for k, gripper in enumerate(self.attach):
+            with part("attach", k):
+                loaded = gripper.attach(loaded, gripper.load.robot(_path_or_name(folder, gripper.robot)))
         robot = bare(loaded)
         acting: list[Effect] = []
         paths: dict[str, tuple[str | int, ...]] = {}  # by the words of messages that stand for them
@@ -194,6 +219,11 @@ class Scene(Part):
         if self.method in ADAPTIVE:
             return Adaptive(self.method, self.rtol, self.atol)
         return method(self.method)
+
+
+def _path_or_name(folder: Path, robot: str) -> Path | str:
+    """Return the path of a robot's file relative to the folder of the scene, or its name if there is no such file."""
+    return file if os.path.isfile(file := folder / robot) else robot
 
 
 def tool_tables() -> dict[str, EntryPoint]:

@@ -5,7 +5,7 @@ The period is the duration of a setup. Each call runs the same segments from tim
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import inf
 from typing import cast, final
@@ -72,7 +72,7 @@ class Periods:
         self._energy, self._p = code.in_python.energy, table.parameters[0]
         self._keys = np.zeros((tiles, 3, LANES), np.uint64)
         self._workers = []
-        for some in np.array_split(np.arange(tiles), min(threads, tiles)):  # each thread has its own work arrays
+        for _ in range(min(threads, tiles)):  # each thread has its own work arrays, and a call for every tile
             stepper = cast(PlainMethod, setup.method).stepper(FLOAT64, equation.size, n, equation.size | 1, LANES)
             lanes = lanes_of(equation, self._y[0], parameters[0], 0, self._p, np.zeros(LANES, np.uint64))
             empty = np.empty((0, 0, LANES))
@@ -82,7 +82,7 @@ class Periods:
             )  # fmt: skip
             config = loop_config(equation, alone=False)._replace(largest=LARGEST)
             position, calls = start_position(inf), []
-            for tile in some:
+            for tile in range(tiles):
                 self._keys[tile] = lanes.keys
                 self._keys[tile, 1] += numbers[tile].astype(np.uint64)
                 runs = lanes._replace(
@@ -139,13 +139,14 @@ class Periods:
         rows = inputs if len(inputs) == len(self._numbers) else inputs[self._numbers]
         self._inputs[...] = rows.reshape(len(self._y), LANES, -1).transpose(0, 2, 1)
         self._y[:, self.work :] = 0.0
-        shared(self._run, len(self._workers), 1, len(self._workers))
+        left = iter(range(len(self._y)))  # a thread takes the next tile; calling next() on it is atomic
+        shared(partial(self._run, left), len(self._workers), 1, len(self._workers))
 
-    def _run(self, first: int, last: int) -> int:
+    def _run(self, tiles: Iterator[int], first: int, last: int) -> int:
         for position, calls in self._workers[first:last]:
-            for call in calls:
+            for tile in tiles:
                 for counter in position[:-1]:
                     counter[0] = 0
                 position.budget[0] = np.iinfo(np.int64).max
-                call()
+                calls[tile]()
         return 0

@@ -6,4 +6,5 @@ __all__: list[str]
 
 # Names that only tools and tests import.
 from robot_dyn.tools.doctor.checkup import checked as checked
+from robot_dyn.tools.doctor.document import Document as Document
 from robot_dyn.tools.doctor.finding import Severity as Severity

@@ -12,9 +12,11 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from robot_dyn import Robot
+from robot_dyn.queries import of_joint
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Finding, Severity
 
+_AFTER = "correct the doubtful masses and lengths of other findings first, then compare again"
 _CAUSES = {"mass_density", "inertia_small", "mass_ratio", "com_outside", "origin_far", "length_long"}
 
 
@@ -26,10 +28,10 @@ def weak_joints(document: Document, robot: Robot, others: Iterable[Finding]) -> 
     for name, load, limit in zip(robot.joint_names, np.abs(N), robot.effort_limit, strict=True):
         if 0 < limit < load:
             joint = document.named("joint", name)
-            stated = joint.find("limit").get("effort").strip()
+            stated, unit = joint.find("limit").get("effort").strip(), of_joint("N m", joint.get("type"))
             yield document.finding(
                 Severity.NOTE if explained else Severity.ERROR, "effort_gravity", joint,
-                f'its effort limit "{stated}" is below the {load:.3g} that gravity alone requires at q = 0, or at the'
-                " nearest position within the limits",
-                "correct the limit, or the masses of the links it carries",
+                f'its effort limit "{stated}" is below the {load:.3g} {unit} that gravity alone requires at q = 0, or'
+                " at the nearest position within the limits",
+                _AFTER if explained else "correct the limit, or the masses of the links it carries",
             )  # fmt: skip

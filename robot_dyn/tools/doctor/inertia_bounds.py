@@ -9,7 +9,7 @@ between axes and products of inertia of the wrong sign. [Wensing, Kim, Slotine 2
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class Body:
         """Return True if no mass distribution within the shape has these moments, up to the slack."""
         if implausibility(self.mass, np.zeros(3), self.moments):
             return True
-        return excess(self.mass, self.moments, self.points) > SLACK
+        return excess(self.mass, self.moments, self.points).ratio > SLACK
 
     def plausible(self) -> bool:
         """Return True if the moments are possible and near a uniform body's, and the density is that of a link."""
@@ -67,16 +67,35 @@ def second_moments(inertia: np.ndarray) -> np.ndarray:
     return np.trace(inertia) / 2 * np.eye(3) - inertia
 
 
-def excess(mass: float, inertia: np.ndarray, points: np.ndarray) -> float:
-    """Return the largest nᵀΣn / (m max (x·n)²) over the eigenvectors n of Σ and the axes; above 1 it is impossible.
+class Excess(NamedTuple):
+    """The direction in which moments exceed the bound of a shape most.
+
+    Attributes:
+        ratio: nᵀΣn / (m max (x·n)²); above 1 the moments are impossible.
+        n: Unit vector, (3,).
+        needed: √(nᵀΣn / m), the least distance of mass from its centre along n, in [m].
+        extent: max |x·n| of the shape, in [m].
+    """
+
+    ratio: float
+    n: np.ndarray
+    needed: float
+    extent: float
+
+
+def excess(mass: float, inertia: np.ndarray, points: np.ndarray) -> Excess:
+    """Return the excess among the eigenvectors n of Σ and the axes.
 
     The mass m lies within the points x, so its second moment along n is at most that of m at the farthest point.
     """
     directions = np.hstack([np.linalg.eigh(second_moments(inertia))[1], np.eye(3)])
     spread = np.einsum("in,ij,jn->n", directions, second_moments(inertia), directions)
     thickness = _THINNEST * np.linalg.norm(points, axis=1).max()
-    extent = np.maximum(np.abs(points @ directions).max(axis=0), thickness)
-    return float(np.max(spread / (mass * np.maximum(extent, np.finfo(float).tiny) ** 2)))
+    extent = np.maximum(np.abs(points @ directions).max(axis=0), max(thickness, np.finfo(float).tiny))
+    ratio = spread / (mass * extent**2)
+    k = int(np.argmax(ratio))
+    needed = float(np.sqrt(max(spread[k], 0.0) / mass))
+    return Excess(float(ratio[k]), directions[:, k], needed, float(extent[k]))
 
 
 def matrix(moments: list[float]) -> np.ndarray:

@@ -130,7 +130,8 @@ def _merged(document: Document, robot: Robot, stated: Structure) -> Iterator[Fin
             listed = ", ".join(map(repr, links[:4]))
             yield document.finding(
                 Severity.ERROR, "inertia_impossible", document.named("link", links[0]),
-                f"merged with the links fixed to it ({listed}), {why}", "correct the inertias of these links",
+                f"merged with the links fixed to it ({listed}), {why}",
+                "correct the inertias of these links: their numbers, order or signs",
             )  # fmt: skip
 
 

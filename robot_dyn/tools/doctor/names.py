@@ -53,6 +53,7 @@ def leftovers(document: Document) -> Iterator[Finding]:
             yield document.finding(
                 Severity.ERROR if grave else Severity.WARNING, "xacro", element,
                 f"contains {match[0]}, which was not expanded",
-                "expand the file: xacro robot.xacro > robot.urdf, or robot-dyn … --xacro ''",
+                "expand the file: xacro robot.xacro > robot.urdf, or add --xacro NAME=VALUE for its arguments (xacro="
+                " in Python)",
             )  # fmt: skip
             return

@@ -28,7 +28,7 @@ _TYPICAL = 0.08, 0.8  # the same ratio in kg m²
 _LIGHTER, _LIGHTEST = 30.0, 10.0  # times lighter than each neighbour, and than all other bodies
 _STEEL, _HEAVIER = 8e3, 4.0  # [kg/m³]; times heavier than each neighbour
 _DIFFERENT = 0.05  # relative difference of masses from those of a data sheet
-_ASK = "compare with the data sheet: give --mass LINK=KG or --total-mass KG (mass=, total_mass= in Python)"
+_ASK = "compare with the data sheet: give --mass {}=KG or --total-mass KG (mass=, total_mass= in Python)"
 
 
 @final
@@ -48,17 +48,22 @@ def wide_links(document: Document, stated: Structure, shaped: Container[str]) ->
         k = _gyration(link)
         far = stated.radius_beyond_reach(link.mass, link.inertia) is not None  # reported as inertia_far
         if name not in shaped and not far and (k > _WIDE if small else ratio > 1):
-            most = f"{_WIDE:g} m" if small else f"{k / ratio:.3g} m, the size of this link in its arm"
+            most = (
+                f"{_WIDE:g} m, the largest in arms of one or two joints"
+                if small
+                else f"{k / ratio:.3g} m, the size of this link in its arm"
+            )
             yield document.finding(
                 Severity.WARNING, "inertia_wide", document.named("link", name).find("inertial"),
                 f"for {link.mass:g} kg, its inertia needs mass at least {k:.3g} m from the centre, beyond {most}",
-                f"correct the mass, the inertia, or its unit; {_ASK}",
+                f"correct the mass, the inertia, or its unit; {_ASK.format(name)}",
             )  # fmt: skip
     for name, joint in stated.joints.items() if small else ():
         if (length := hypot(*joint.xyz)) > _FAR:
             yield document.finding(
                 Severity.WARNING, "origin_far", document.named("joint", name),
-                f"its origin is {length:.3g} m from its parent link, in an arm of {len(stated.moving)} moving joints",
+                f"its origin is {length:.3g} m from its parent link, over {_FAR:g} m, the largest in arms of one or two"
+                " joints",
                 "correct it, or convert it to metres",
             )  # fmt: skip
 
@@ -95,8 +100,8 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
         yield Finding(
             Severity.ERROR, "inertia_unit", "robot",
             "the moments of all links are too large by a common factor: their radii of gyration are typically"
-            f" {np.median(ratios):.2g} times the size of the link: the unit {' or '.join(units.values())} is suspected",
-            "export in kg m², or convert all moments: --fix --inertia-unit UNIT (inertia_unit= in Python)",
+            f" {np.median(ratios):.0f} times the size of the link: the unit {' or '.join(units.values())} is suspected",
+            f"export in kg m², or convert all moments: {' or '.join(map(_option, units.values()))}",
             None, tuple(changes),
         )  # fmt: skip
     if unit is not None and power not in units:
@@ -104,6 +109,10 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
             Severity.NOTE, "inertia_unit", "robot", f"its moments do not look like {name} and were not converted",
             f"choose {' or '.join(units.values())}" if units else "remove inertia_unit, or correct single links",
         )  # fmt: skip
+
+
+def _option(unit: str) -> str:
+    return f'--fix --inertia-unit "{unit}"'
 
 
 def checked_unit(unit: str) -> str:
@@ -161,8 +170,9 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
             )
         else:
             continue
-        element = document.named("link", stated.joints[joint].child)
-        yield document.finding(Severity.WARNING, "mass_neighbours", element, what, _ASK)
+        name = stated.joints[joint].child
+        element = document.named("link", name)
+        yield document.finding(Severity.WARNING, "mass_neighbours", element, what, _ASK.format(name))
 
 
 def of_data_sheet(document: Document, stated: Structure, sheet: Sheet) -> Iterator[Finding]:

@@ -38,6 +38,7 @@ _MATERIAL, _MOST, _FEWEST = (
 )  # deviation from the median density; fraction of links; minimum number of different masses
 IMPOSSIBLE = "inertia_impossible", "inertia_shape", "inertia_direction"
 _EXPLAINED = *IMPOSSIBLE, "mass_density", "com_outside", "inertia_small", "shape_in_mm"
+_AXIS = 0.9999  # largest component of a direction that is an axis, within 0.8°
 _GRAVE = 3.0  # ratio of ½ tr I to m d² above which M is wrong by a factor; below, values may be rounded
 
 
@@ -234,16 +235,25 @@ def directions(
     doubtful = {finding.where for finding in findings if finding.kind in _EXPLAINED}
     names = {name for name in of if f"link {name!r}" not in doubtful}
     for name, body in bodies(robot, of, package_dirs, names).items():
-        ratio = excess(body.mass, body.moments, body.points)
-        if ratio > SLACK:
-            severity = Severity.WARNING if ratio > _GRAVE and name not in stated.base else Severity.NOTE
+        most = excess(body.mass, body.moments, body.points)
+        if most.ratio > SLACK:
+            severity = Severity.WARNING if most.ratio > _GRAVE and name not in stated.base else Severity.NOTE
             inertial = document.named("link", name).find("inertial")
             yield document.finding(
                 severity, "inertia_direction", inertial,
-                f"along one direction its moments imply a second moment {ratio:.3g} times the largest that"
-                f" {body.mass:g} kg can have within its shape",
-                "correct the moments: their axes, the signs of the products, or the numbers",
+                f"along {_direction(most.n)} of its <inertial>, its moments need mass at least {most.needed:.3g} m from"
+                f" the centre, but its shape ends at {most.extent:.3g} m: {most.ratio:.3g} times the largest second"
+                " moment at any density",
+                "compare its six moments with the CAD export: axes, signs of products, unit",
             )  # fmt: skip
+
+
+def _direction(n: np.ndarray) -> str:
+    """Return a direction in words: an axis, or its components in the axes."""
+    k = int(np.abs(n).argmax())
+    if abs(n[k]) > _AXIS:
+        return f"the {'xyz'[k]} axis"
+    return f"({', '.join(f'{x:.2g}' for x in n * np.sign(n[k]))}) in the axes"
 
 
 def bodies(
@@ -260,7 +270,7 @@ def bodies(
         for name, shape in of.items()
         if name in names and links[name].mass > 0 and any(links[name].moments)
     }
-    exceeding = {name for name, body in result.items() if excess(body.mass, body.moments, body.points) > SLACK}
+    exceeding = {name for name, body in result.items() if excess(body.mass, body.moments, body.points).ratio > SLACK}
     pieces, _ = solids(robot, package_dirs, ("visual",), exceeding) if exceeding else ({}, ())
     for name, drawn in pieces.items():
         if drawn:

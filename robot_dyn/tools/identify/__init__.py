@@ -1,6 +1,8 @@
 """Identification: the parameters of an arm from its motion.
 
 excite               the motion within limits that shows the most about the parameters (Excitation, ExpectedPrecision)
+    identify             an arm from a log of its motion, or why not (Identification, Parameter, HeldOut, LogError)
+                         and the causes of its difference from the file (Verdict, Cause)
     static               gravity parameters, offsets and tilt from poses at rest (Poses, StaticEstimate)
 """
 

@@ -1,9 +1,16 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.tools.identify.excitation import Excitation as Excitation
 from robot_dyn.tools.identify.excitation import excite as excite
+from robot_dyn.tools.identify.identification import identify as identify
 from robot_dyn.tools.identify.information import ExpectedPrecision as ExpectedPrecision
+from robot_dyn.tools.identify.log import LogError as LogError
 from robot_dyn.tools.identify.rest_poses import Poses as Poses
 from robot_dyn.tools.identify.rest_poses import StaticEstimate as StaticEstimate
 from robot_dyn.tools.identify.rest_poses import static as static
+from robot_dyn.tools.identify.result import HeldOut as HeldOut
+from robot_dyn.tools.identify.result import Identification as Identification
+from robot_dyn.tools.identify.result import Parameter as Parameter
+from robot_dyn.tools.identify.verdict import Cause as Cause
+from robot_dyn.tools.identify.verdict import Verdict as Verdict
 
 __all__: list[str]

@@ -1,0 +1,159 @@
+"""From a log to base parameters, friction, offsets and a time offset, by weighted instrumental variables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from robot_dyn import Robot
+from robot_dyn.foundations import Value
+from robot_dyn.tools.identify.base_parameters import BaseParameters
+from robot_dyn.tools.identify.regression import Fit, Rows, fit
+from robot_dyn.tools.identify.signals import Signals, low_pass
+
+if TYPE_CHECKING:
+    from robot_dyn.tools.identify.log import Log
+
+    State = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+VISCOUS, COULOMB, OFFSET, TIME, ROTOR = "viscous", "coulomb", "torque offset", "time offset", "rotor inertia"
+_LATEST_S = 0.02  # largest time offset, in [s]
+_ITERATIONS, _SAME_S = 6, 2e-5
+_SMOOTH = 0.25  # cutoff of instruments from the log itself, in units of the cutoff
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Model(Value):
+    """The linear model of a log.
+
+    Attributes:
+        arm: The arm.
+        base: Its base parameters.
+        rotors: Joints whose rotor inertia can be distinguished from the inertia of the bodies.
+    """
+
+    arm: Robot
+    base: BaseParameters
+    rotors: tuple[int, ...]
+
+    @cached_property
+    def known_rotors(self) -> np.ndarray:
+        """Rotor inertias of the other joints as the arm states them, (n,), 0 for `rotors`."""
+        result = np.array(self.arm.armature, float)
+        result[list(self.rotors)] = 0.0
+        return result
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, without the time offset."""
+        kinds = (VISCOUS, COULOMB, OFFSET)
+        joints = self.arm.joint_names
+        rotors = tuple(f"{joints[i]} {ROTOR}" for i in self.rotors)
+        return (*self.base.names, *rotors, *(f"{joint} {kind}" for kind in kinds for joint in joints))
+
+    def columns(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the regressor of all parameters except the time offset, (k, n, p)."""
+        (k, n), r, i = q.shape, len(self.base.columns), np.arange(self.arm.n)
+        c, d = len(self.rotors), r + len(self.rotors)
+        Y = np.zeros((k, n, d + 3 * n))
+        Y[..., :r] = self.arm.regressor(q, v, a)[..., self.base.columns]
+        Y[:, list(self.rotors), r + np.arange(c)] = a[:, list(self.rotors)]
+        Y[:, i, d + i], Y[:, i, d + n + i], Y[:, i, d + 2 * n + i] = v, np.sign(v), 1.0
+        return Y
+
+
+def model_of(arm: Robot, base: BaseParameters) -> Model:
+    """Return the model of an arm; a rotor inertia that base parameters contain already is left out."""
+    rng = np.random.default_rng(1)
+    q, v, a = rng.uniform(-np.pi, np.pi, (3, 200, arm.n))
+    Y = np.asarray(arm.regressor(q, v, a))[..., base.columns].reshape(200 * arm.n, -1)
+    distinct = []
+    for i in range(arm.n):
+        column = (a * np.eye(arm.n)[i]).ravel()
+        rest = column - Y @ np.linalg.lstsq(Y, column, rcond=None)[0]
+        if np.linalg.norm(rest) > 1e-6 * np.linalg.norm(column):
+            distinct.append(i)
+            Y = np.column_stack([Y, column])
+    return Model(arm, base, tuple(distinct))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Estimate(Value):
+    """Estimate of all parameters of a log.
+
+    Attributes:
+        fit: The fit; its last parameter is the time offset, in [s].
+        rows: Its rows, with torques that were shifted by the time offset, less those of known rotor inertias.
+        times: Times of the rows, (m,), in [s].
+        signals: Filters of the rows.
+        state: Positions, velocities and accelerations before the second filter, each (k, n).
+        instruments: The same for the instruments.
+    """
+
+    fit: Fit
+    rows: Rows
+    times: np.ndarray
+    signals: Signals
+    state: State
+    instruments: State
+
+
+def estimate(
+    model: Model, log: Log, signals: Signals, slow: np.ndarray, check: Callable[..., None] = lambda *_: None
+) -> Estimate:
+    """Return the estimate from a log; `check` is called with the rows, the motion and the torques before the fit.
+
+    Rows of a joint slower than `slow`, (n,), and rows within the filter's memory of such rows, are left out.
+    """
+    q = signals.first(log.q)
+    state, tau = signals.rates(q), signals.first(log.tau)
+    if log.reference is None:
+        cutoff = _SMOOTH * signals.cutoff_hz * signals.step_s
+        instruments = signals.rates(low_pass(log.q, cutoff))
+    else:
+        instruments = tuple(x[:: signals.every] for x in log.reference)
+    names, full = (*model.names, TIME), model.columns(*state)
+    independent = model.columns(*instruments)
+    Y, Z = signals.second(full), signals.second(independent)
+    moving = np.abs(state[1]) > slow
+    used = signals.second_of(_eroded(moving, signals))
+    known = state[2] * model.known_rotors
+    rate = np.gradient(tau, signals.step_s, axis=0)
+    at, times, delta = signals.row_times, signals.times, 0.0
+    values = None
+    for _ in range(_ITERATIONS):
+        shifted = np.stack([np.interp(at + delta, times, x) for x in tau.T], axis=1)
+        rates = np.stack([np.interp(at + delta, times, x) for x in rate.T], axis=1)
+        predicted = (
+            rates if values is None else np.gradient(independent @ values, signals.step_s * signals.every, axis=0)
+        )
+        rows = Rows(
+            names,
+            np.concatenate([Y, signals.second(rates)[..., None]], axis=2),
+            np.concatenate([Z, signals.second(predicted)[..., None]], axis=2),
+            signals.second(shifted - known),
+            used,
+        )
+        if values is None:
+            check(rows, *map(signals.second_of, state), signals.second_of(shifted))
+        result = fit(rows)
+        step = result.values[-1]
+        values, delta = result.values[:-1], float(np.clip(delta - step, -_LATEST_S, _LATEST_S))
+        if abs(step) < _SAME_S or abs(delta) == _LATEST_S:
+            break
+    result = replace(result, values=np.append(result.values[:-1], delta))
+    return Estimate(result, rows, signals.second_of(at), signals, state, instruments)
+
+
+def _eroded(moving: np.ndarray, signals: Signals) -> np.ndarray:
+    """Return True for times whose neighbours within half a period of the cutoff are True."""
+    from scipy.ndimage import binary_erosion
+
+    half = int(0.5 / (signals.cutoff_hz * signals.step_s * signals.every))
+    return binary_erosion(moving, np.ones((2 * half + 1, 1), bool), border_value=1)

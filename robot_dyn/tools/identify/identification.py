@@ -1,0 +1,245 @@
+"""Identify an arm from a log: estimate, physical parameters, held-out error, verdict, corrected URDF."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_dyn import Robot
+from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, ViscousFriction
+from robot_dyn.foundations import instance, number, numbers
+from robot_dyn.report import processor_and_versions
+from robot_dyn.tools.identify.base_parameters import base_parameters
+from robot_dyn.tools.identify.corrected import corrected
+from robot_dyn.tools.identify.estimation import COULOMB, VISCOUS, Estimate, Model, estimate, model_of
+from robot_dyn.tools.identify.log import LogError, read_log, swapped
+from robot_dyn.tools.identify.physical import Links, links_of, physical
+from robot_dyn.tools.identify.regression import Rows, fit, rms
+from robot_dyn.tools.identify.result import HeldOut, Identification, Parameter
+from robot_dyn.tools.identify.signals import Signals
+from robot_dyn.tools.identify.verdict import verdict_of
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+_CUTOFF_HZ = 8.0
+_SLOW = 0.05  # of the largest speed of a joint
+_TRAINING = 0.75  # part of the log, at its start, that fits the numbers of the held-out error
+_LEAST_ROWS = 20  # of a joint
+_DEPENDENT = 1e-7  # least singular value of columns of unit length
+_FOREIGN = 0.5  # held-out error, of the torque's deviation, of a log of another arm
+
+
+def identify(
+    arm: Robot,
+    log: Any,
+    *,
+    reference: PiecewisePolynomial | None = None,
+    gains: ArrayLike | None = None,
+    effects: Iterable[Effect] | None = None,
+    cutoff_hz: float = _CUTOFF_HZ,
+    slow: ArrayLike | None = None,
+) -> Identification:
+    """Estimate the parameters of an arm, its friction and offsets from a log of its motion.
+
+    Torques are linear in base parameters, rotor inertias, viscous and Coulomb friction, offsets and a time offset. They
+    are estimated by weighted instrumental variables from the desired motion, without rows of a joint near rest.
+
+    Args:
+        arm: The arm of the file; joints that do not move are locked.
+        log: CSV file, data frame, columns by heading, or `Trajectory`: "t", "q JOINT", "tau JOINT" or "current JOINT",
+            and "desired JOINT" if known. In a dict, "t", "q", "tau", "current" and "desired" may be arrays (m, n).
+        reference: The desired motion at the times of the log, if the log has no desired positions. Without it,
+            instruments are smoothed positions of the log, and intervals are less reliable.
+        gains: Drive gains, a number or (n,), in [N m/A], if the log has currents.
+        effects: Friction that the arm is supposed to have, `ViscousFriction`, `DryFriction` or
+            `RegularisedCoulombFriction`; then wrong friction can be a cause in the verdict.
+        cutoff_hz: Cutoff of the zero-phase filters of regressor and torque, in [Hz].
+        slow: Speed below which rows of a joint are left out, a number or (n,), in [rad/s] or [m/s]; by default 5 % of
+            the largest speed of the joint.
+
+    Raises:
+        LogError: If the log lacks torques, a joint does not move, a torque is constant or saturated, columns are
+            swapped, the motion does not determine the parameters, or the log does not follow the arm's equations.
+        PlanError: If positions or times are missing, or angles look like degrees.
+        MissingExtraError: If cvxpy or clarabel is not installed: pip install 'robot-dyn[identify]'.
+
+    Source: Janot, Vandanjon, Gautier, A generic instrumental variable approach for industrial robot identification,
+    2014; Wensing, Kim, Slotine 2018.
+    """
+    instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=LogError)
+    cutoff_hz = number("cutoff_hz", cutoff_hz, above=0, error=LogError)
+    links, stated = links_of(arm), _friction(arm, effects)
+    record = read_log(arm, log, reference, gains)
+    model = model_of(arm, base_parameters(arm))
+    signals = Signals(float(record.t[0]), record.step_s, len(record.t), cutoff_hz)
+    speed = np.abs(np.gradient(signals.first(record.q), record.step_s, axis=0)).max(axis=0)
+    least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
+    result = estimate(model, record, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
+    held_out = _held_out(model, result)
+    _refuse_foreign(arm, result, held_out)
+    r = len(model.base.columns)
+    theta = physical(links, model.base.R, result.fit.values[:r], result.fit.covariance[:r, :r])
+    parameters = tuple(_parameters(model, result))
+    friction = _identified_friction(model, result)
+    robot, text = _corrected(arm, links, theta, friction, parameters, model, result)
+    return Identification(
+        arm.name,
+        parameters,
+        *_determined(model, result, links, theta),
+        tuple(
+            f"rotor inertia of {name} with {name} Izz"
+            for i, name in enumerate(arm.joint_names)
+            if i not in model.rotors
+        ),
+        float(result.fit.values[-1]),
+        float(result.fit.half_widths[-1]),
+        held_out,
+        verdict_of(model, links, result, stated),
+        record.reference is not None,
+        cutoff_hz,
+        processor_and_versions(),
+        robot,
+        text,
+    )
+
+
+def _friction(arm: Robot, effects: Iterable[Effect] | None) -> np.ndarray | None:
+    """Return viscous and Coulomb friction of effects, (2, n); None without effects."""
+    if effects is None:
+        return None
+    result = np.zeros((2, arm.n))
+    for effect in effects:
+        if isinstance(effect, ViscousFriction):
+            result[0] += effect.viscous
+        elif isinstance(effect, DryFriction | RegularisedCoulombFriction):
+            result[1] += effect.coulomb
+        else:
+            raise LogError(f"effects: {type(effect).__name__} is not friction; remove it from the log's torques first")
+    return result
+
+
+def _refuse(arm: Robot) -> Any:
+    """Return a check of rows before a fit."""
+
+    def check(rows: Rows, q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.ndarray) -> None:
+        for i, j in swapped(tau, np.asarray(arm.inverse_dynamics(q, v, a)), v):
+            names = arm.joint_names
+            raise LogError(
+                f"the torques of {names[i]} and {names[j]} seem to be swapped: each follows the model of the other;"
+                " exchange the columns"
+            )
+        count = rows.used.sum(axis=0)
+        for i in np.flatnonzero(count < _LEAST_ROWS)[:1]:
+            raise LogError(
+                f"{arm.joint_names[i]} moves in {count[i]} independent rows only, {_LEAST_ROWS} are needed; record a"
+                " longer motion"
+            )
+        W = (rows.Y[..., :-1] * rows.used[..., None]).reshape(-1, rows.Y.shape[2] - 1)
+        s, V = np.linalg.svd(W / np.maximum(np.linalg.norm(W, axis=0), 1e-300), full_matrices=False)[1:]
+        if rank := int((s <= _DEPENDENT * s[0]).sum()):
+            names = [rows.names[k] for k in np.argsort(-np.abs(V[-1]))[:3]]
+            raise LogError(
+                f"the motion does not determine {rank} of {len(s)} parameters, for example {', '.join(names)}; record a"
+                " motion of rd.tools.identify.excite(arm)"
+            )
+
+    return check
+
+
+def _held_out(model: Model, found: Estimate) -> HeldOut:
+    """Return rms errors of the last quarter of the log, with numbers from its first three."""
+    rows, m = found.rows, len(found.rows.tau)
+    training = np.arange(m)[:, None] < _TRAINING * m
+    n, last = model.arm.n, rows.used & ~training
+    own = np.concatenate(
+        [model.base.R @ model.arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]]
+    )
+    rest = rows.tau - rows.Y[..., : len(own)] @ own
+    joints = np.arange(len(own), len(own) + 3 * n)
+    fitted = fit(rows.where(training).only(joints, rest))
+    new = fit(rows.where(training))
+    return HeldOut(
+        model.arm.joint_names,
+        rms(rest, last),
+        rms(rest - rows.Y[..., joints] @ fitted.values, last),
+        rms(rows.tau - rows.Y @ new.values, last),
+        rms(rows.tau - rows.tau.mean(axis=0), last),
+    )
+
+
+def _refuse_foreign(arm: Robot, found: Estimate, held_out: HeldOut) -> None:
+    ratio = np.sqrt((held_out.identified**2 / held_out.deviation**2).mean())
+    if not ratio <= _FOREIGN:
+        raise LogError(
+            f"the torques do not follow the equations of {arm.name}: with the best numbers the held-out error is"
+            f" {ratio:.0%} of their deviation; is the log of another arm, or are its columns in another order?"
+        )
+
+
+def _parameters(model: Model, found: Estimate) -> Iterable[Parameter]:
+    own = np.concatenate(
+        [model.base.R @ model.arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]]
+    )
+    values = np.concatenate([own, np.full(len(found.fit.names) - len(own), np.nan)])
+    robust = found.fit.half_widths / found.fit.standard_errors * np.sqrt(np.diag(found.fit.robust))
+    for row in zip(found.fit.names[:-1], found.fit.values, found.fit.half_widths, robust, values, strict=False):
+        yield Parameter(*row[:1], *map(float, row[1:]))
+
+
+def _identified_friction(model: Model, found: Estimate) -> np.ndarray:
+    by_name = dict(zip(found.fit.names, found.fit.values, strict=True))
+    return np.array(
+        [[max(0.0, by_name[f"{joint} {kind}"]) for joint in model.arm.joint_names] for kind in (VISCOUS, COULOMB)]
+    )
+
+
+def _determined(
+    model: Model, found: Estimate, links: Links, theta: np.ndarray
+) -> tuple[tuple[Parameter, ...], tuple[str, ...]]:
+    """Return the inertial parameters of bodies that the log determines alone, and the names of the others."""
+    base, r = model.base, len(model.base.columns)
+    C = found.fit.covariance[:r, :r]
+    factor = found.fit.half_widths[0] / found.fit.standard_errors[0]
+    bodies = np.array([links.X[b] @ theta[b] + links.rest[b] for b in range(len(theta))]).ravel()
+    own = model.arm.inertial_parameters
+    alone, blind = [], []
+    for k, name in enumerate(base.full_names):
+        c = np.linalg.lstsq(base.R.T, np.eye(len(own))[k], rcond=None)[0]
+        if np.linalg.norm(base.R.T @ c - np.eye(len(own))[k]) < 1e-6:
+            w = factor * float(np.sqrt(c @ C @ c))
+            alone.append(Parameter(name, float(bodies[k]), w, np.nan, float(own[k])))
+        else:
+            blind.append(name)
+    return tuple(alone), tuple(blind)
+
+
+def _corrected(
+    arm: Robot, links: Links, theta: np.ndarray, friction: np.ndarray, parameters: tuple[Parameter, ...], model: Model,
+    found: Estimate,
+) -> tuple[Robot, bytes]:  # fmt: skip
+    """Return the arm of the corrected file, with the edits of `arm`, and the text of the file."""
+    notes: dict[str, str] = {}
+    for body, link in zip(arm.body_names, links.names, strict=True):
+        own = [p for p in parameters if p.name.startswith(f"{body} ") and p.name in model.base.names]
+        values = "; ".join(f"{p.name.removeprefix(body).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own)
+        notes[link] = f"identified base parameters (95 %): {values or 'none'}; the rest is nearest to the old file"
+    for joint in arm.joint_names:
+        own = [p for p in parameters if p.name in (f"{joint} {VISCOUS}", f"{joint} {COULOMB}")]
+        notes[joint] = "identified friction (95 %): " + "; ".join(
+            f"{p.name.removeprefix(joint).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own
+        )
+    text = corrected(arm, links, theta, friction, notes)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # findings about the file, which the arm has shown already
+        robot = Robot.from_text(text, source=arm.description.source)
+    if arm.edits.lock:
+        robot = robot.with_(lock=dict(arm.edits.lock))
+    armature = dict(zip(arm.joint_names, np.array(arm.armature).tolist(), strict=True))
+    for i, value in zip(model.rotors, found.fit.values[len(model.base.columns) :], strict=False):
+        armature[arm.joint_names[i]] = max(0.0, float(value))
+    return robot.with_(gravity=arm.gravity, armature=armature), text

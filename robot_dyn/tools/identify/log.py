@@ -1,0 +1,179 @@
+"""A log of an arm: positions and torques, or motor currents, at equal times; what cannot be a log is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from robot_dyn import Robot, RobotDynError, Trajectory
+from robot_dyn.control import PiecewisePolynomial, name_of, recorded, refuse_other_units, table_of
+from robot_dyn.foundations import Value, instance, numbers, read_only
+from robot_dyn.tools.identify.signals import evenly
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    State = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+TORQUES = ("tau", "torque", "effort", "u")
+_STILL = 1e-3  # [rad] or [m]: range of a joint that does not move
+_STUCK, _STUCK_PART = 5, 0.01  # equal samples in a row at an extreme, and their part of a log
+_LEAST = 50  # samples
+
+
+class LogError(RobotDynError):
+    """A log does not suffice to identify the arm."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Log(Value):
+    """A log at equal times.
+
+    Attributes:
+        t: Times, (m,), in [s].
+        q: Positions, (m, n), in [rad] or [m].
+        tau: Torques, (m, n), in [N m] or [N].
+        reference: Positions, velocities and accelerations of the desired motion, each (m, n); None without one.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    tau: np.ndarray
+    reference: State | None
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @property
+    def step_s(self) -> float:
+        """Time between samples, in [s]."""
+        return float(self.t[1] - self.t[0])
+
+
+def read_log(
+    arm: Robot, source: Any, reference: PiecewisePolynomial | None = None, gains: ArrayLike | None = None
+) -> Log:
+    """Return the log in a source.
+
+    It has times, positions "q JOINT", torques "tau JOINT" or currents "current JOINT", and perhaps "desired JOINT".
+
+    Args:
+        arm: The arm.
+        source: A CSV file, a data frame, columns by heading, or a `Trajectory`. In a dict, "t", "q", "tau", "current"
+            and "desired" may be arrays (m, n) in the order of the joints.
+        reference: The desired motion at the times of the log.
+        gains: Drive gains, a number or (n,), in [N m/A], that turn currents into torques.
+
+    Raises:
+        LogError: If the torques are missing or constant, a joint does not move, or a torque is saturated.
+        PlanError: If positions or times are missing, or angles look like degrees.
+    """
+    table = table_of(_spread(arm, source), arm.joint_names, {}, None, None)
+    columns = {name_of(head): head for head in table.columns}
+    times = {head: x for head, x in table.columns.items() if name_of(head) in ("t", "time", "timestamp", "stamp")}
+    q_heads = {
+        joint: next((columns[k] for k in (f"q {joint}", joint) if k in columns), None) for joint in arm.joint_names
+    }
+    q_columns = {_renamed(head, joint): table.columns[head] for joint, head in q_heads.items() if head is not None}
+    samples = recorded(arm, times | q_columns)
+    refuse_other_units(samples)
+    t, q = samples.t, samples.q
+    if len(t) < _LEAST:
+        raise LogError(f"the log has {len(t)} samples, at least {_LEAST} are needed; record a longer motion")
+    tau = _torques(arm, table.columns, columns, gains)
+    _refuse(arm, q, tau)
+    times_even = np.arange(t[0], t[-1], float(np.median(np.diff(t))))
+    desired = [columns.get(f"desired {joint}") for joint in arm.joint_names]
+    along = None
+    if reference is not None:
+        instance("reference", reference, PiecewisePolynomial, "give the reference of a plan", error=LogError)
+        along = reference.at(times_even)
+    elif None not in desired:
+        along = _rates(t, np.stack([table.columns[str(head)] for head in desired], axis=1), times_even)
+    return Log(times_even, evenly(t, q, times_even), evenly(t, tau, times_even), along)
+
+
+def _spread(arm: Robot, source: Any) -> Any:
+    """Return a source whose arrays (m, n) are columns by joint."""
+    if isinstance(source, Trajectory):
+        return source.table()
+    if not isinstance(source, Mapping) or not any(np.ndim(x) == 2 for x in source.values()):
+        return source
+    result: dict[str, np.ndarray] = {}
+    for key, x in source.items():
+        if np.ndim(x) == 2:
+            x = numbers(str(key), x, ("m", arm.n), error=LogError)
+            result |= {f"{key} {joint}": column for joint, column in zip(arm.joint_names, x.T, strict=True)}
+        else:
+            result[str(key)] = np.asarray(x)
+    return result
+
+
+def _renamed(head: str, joint: str) -> str:
+    """Return the heading of positions with the name of the joint alone, and its unit."""
+    return joint + head[len(name_of(head)) :] if head.startswith(name_of(head)) else joint
+
+
+def _torques(arm: Robot, table: Mapping[str, np.ndarray], columns: Mapping[str, str], gains: Any) -> np.ndarray:
+    kinds = ("current",) if gains is not None else TORQUES
+    heads = {joint: next((columns[f"{kind} {joint}"] for kind in kinds if f"{kind} {joint}" in columns), None)
+             for joint in arm.joint_names}  # fmt: skip
+    if missing := [joint for joint, head in heads.items() if head is None]:
+        if gains is None and all(f"current {joint}" in columns for joint in arm.joint_names):
+            raise LogError("the log has currents, not torques; give the drive gains in N m/A as gains=")
+        raise LogError(f"there is no column '{kinds[0]} {missing[0]}': the log needs one for each joint; add it")
+    tau = np.stack([np.asarray(table[str(head)], float) for head in heads.values()], axis=1)
+    if not np.isfinite(tau).all():
+        k, i = np.argwhere(~np.isfinite(tau))[0]
+        raise LogError(f"{kinds[0]} {arm.joint_names[i]}: sample {k + 1} is {tau[k, i]}; remove the sample")
+    if gains is None:
+        return tau
+    return tau * numbers("gains", gains, (), (arm.n,), error=LogError)
+
+
+def _refuse(arm: Robot, q: np.ndarray, tau: np.ndarray) -> None:
+    """Raise a LogError about the first joint that does not move, or whose torque is constant or saturated."""
+    for i, joint in enumerate(arm.joint_names):
+        if np.ptp(q[:, i]) < _STILL:
+            raise LogError(
+                f"{joint} moves by {np.ptp(q[:, i]):.2g} in the log: lock it by"
+                f" arm.with_(lock={{{joint!r}: {q[0, i]:.4g}}}), or record a motion of all joints"
+            )
+        if np.ptp(tau[:, i]) == 0:
+            raise LogError(f"the torque of {joint} is constant, {tau[0, i]:.4g}; record the measured torque")
+        for level in (tau[:, i].max(), tau[:, i].min()):
+            at = tau[:, i] == level
+            longest = max(map(len, "".join("x" if x else " " for x in at).split()), default=0)
+            if longest >= _STUCK and at.mean() > _STUCK_PART:
+                raise LogError(
+                    f"the torque of {joint} stays at {level:.4g} for {longest} samples: it is saturated; record a"
+                    " slower motion"
+                )
+
+
+def _rates(t: np.ndarray, q: np.ndarray, at: np.ndarray) -> State:
+    """Return positions, velocities and accelerations of desired positions."""
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(t, q, k=5)
+    return spline(at), spline.derivative()(at), spline.derivative(2)(at)
+
+
+def swapped(tau: np.ndarray, model: np.ndarray, v: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Yield pairs of joints whose torques follow the model of the other joint: r² higher by a half in both."""
+    n = tau.shape[1]
+    r2 = np.array([[_r2(tau[:, i], model[:, j], v[:, j]) for j in range(n)] for i in range(n)])
+    for i in range(n):
+        for j in range(i):
+            if min(r2[i, j] - r2[i, i], r2[j, i] - r2[j, j]) > 0.5:
+                yield j, i
+
+
+def _r2(tau: np.ndarray, model: np.ndarray, v: np.ndarray) -> float:
+    A = np.column_stack([model, v, np.sign(v), np.ones(len(v))])
+    rest = tau - A @ np.linalg.lstsq(A, tau, rcond=None)[0]
+    return 1 - float(rest.var() / max(tau.var(), 1e-300))
