@@ -97,9 +97,9 @@ class PayloadEstimate(Answer, Value):
 
 def payload(
     arm: Robot,
-    log: Any,
+    log: object,
     *,
-    empty: Any = None,
+    empty: object = None,
     link: str | None = None,
     reference: PiecewisePolynomial | None = None,
     gains: ArrayLike | None = None,
@@ -129,7 +129,7 @@ def payload(
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=LogError)
 
-    def estimate(source: Any) -> tuple[Model, Estimate]:
+    def estimate(source: object) -> tuple[Model, Estimate]:
         return estimated(arm, read_log(arm, source, reference, gains), cutoff_hz, slow)
 
     model, loaded = estimate(log)
