@@ -14,6 +14,7 @@ from lxml import html
 import robot_dyn as rd
 from robot_dyn.foundations import Answer, Table, display, table
 from tests.long import long
+from tests.tools.identify import logs
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, 0.4])
@@ -31,6 +32,7 @@ CELLS = {
     " methods=['RK4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
     "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=1.0)",
     "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
+    "identify": "rd.tools.identify.identify(logs.FILE, logs.log(), reference=logs.reference())",
     "excite": "rd.tools.identify.excite(arm, 5.0, limits={'lower': -2, 'upper': 2, 'velocity': 2.0, 'torque': 60.0},"
     " starts=1, compare_longer=False)",
     "info": "rd.info(rd.load('panda'))",
@@ -44,7 +46,7 @@ NAMES = [pytest.param(name, id=name) for name in CELLS]
 
 @cache
 def made(name: str) -> Any:
-    return eval(CELLS[name], {"rd": rd, "np": np, "arm": ARM, "q": Q})
+    return eval(CELLS[name], {"rd": rd, "logs": logs, "np": np, "arm": ARM, "q": Q})
 
 
 def texts(result: Answer) -> list[str]:

@@ -37,11 +37,11 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation", "ExpectedPrecision",
-    "InverseKinematics", "MotorBudget", "Motors",
-    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State", "StaticEstimate", "Stress",
-    "SweepResult",
-    "Trajectory", "WorkPrecision",
+    "Advice", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation", "ExpectedPrecision",
+    "HeldOut", "Identification", "InverseKinematics", "MotorBudget", "Motors",
+    "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State",
+    "StaticEstimate", "Stress", "SweepResult",
+    "Trajectory", "Verdict", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -143,6 +143,10 @@ def examples(folder: Path) -> dict[str, Example]:
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
     excited = rd.tools.identify.excite(robot, 5.0, limits={"velocity": 2.0}, starts=1, compare_longer=False)
     states = np.random.default_rng(0).uniform(-1, 1, (12, 2))
+    t = np.linspace(0.0, 5.0, 1001)
+    moved, *rates = excited.reference.at(t)
+    current = robot.inverse_dynamics(moved, *rates) + rates[0] + np.random.default_rng(0).normal(0, 0.1, (1001, 2))
+    log = {"t": t, "q": moved, "current": current}
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
     arms = rd.tools.step.Stepper(plant, 2)
@@ -292,6 +296,11 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.identify.static, arm=robot, poses=rd.tools.identify.Poses(states, robot.N(states)), friction=0.5,
             noise=0.1, tilt=False),
         call(excited.save, path=folder / "excitation.csv"),
+        call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, gains=1.0,
+            effects=[rd.effects.ViscousFriction(0.1)], cutoff_hz=6.0, slow=0.05),
+        call(rd.tools.identify.payload, arm=robot, log=log, empty=log, link="pole", reference=excited.reference,
+            gains=1.0, cutoff_hz=6.0, slow=0.05),
+        call(rd.tools.identify.identify(robot, log, gains=1.0).save, path=folder / "arm.urdf"),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),
         call(rd.tools.motors.budget, motion=rd.control.quintic(q, v, 1.0), plant=plant, payload=rd.Payload("pole",

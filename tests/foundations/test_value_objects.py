@@ -18,6 +18,7 @@ import robot_dyn as rd
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
 from tests.effect_examples import EFFECTS, arguments, example
 from tests.short_stress import short_stress
+from tests.tools.identify import logs
 from tests.wrong_arguments import FOR_AUTHORS, ROOMS
 
 ARM = rd.load("planar_2r")
@@ -29,6 +30,7 @@ CLASSES = {
     name for room in ROOMS for name in room.__all__ if isclass(thing := getattr(room, name)) and not isabstract(thing)
 }
 NO_VALUES = FOR_AUTHORS | {
+    "LogError",
     "ModelWarning",
     "PrecisionWarning",
     "RobotDynError",
@@ -102,6 +104,9 @@ def values() -> dict[str, Any]:
         (planned := rd.tools.identify.excite(ARM, 5.0, limits=BOUNDS, starts=1, compare_longer=False)),
         planned.expected, (poses := rd.tools.identify.Poses(np.eye(2), ARM.N(np.eye(2)))),
         rd.tools.identify.static(ARM, poses, friction=1.0),
+        (identified := rd.tools.identify.identify(logs.FILE, logs.log(), reference=logs.reference())),
+        rd.tools.identify.payload(logs.FILE, logs.log(), reference=logs.reference(), link="tip"),
+        identified.parameters[0], identified.held_out, identified.verdict, identified.verdict.causes[0],
         rd.tools.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
         rd.tools.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),
         rd.tools.step.Stepper(ARM, 3).reset(Q),

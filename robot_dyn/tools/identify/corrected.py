@@ -51,7 +51,7 @@ def _set(parent: Any, tag: str, attributes: Mapping[str, str], rewritten: set[tu
 
 
 def _with_notes(text: bytes, notes: Mapping[str, str]) -> bytes:
-    """Return the text with a comment on a line of its own above each named link and joint."""
+    """Return the text with a comment in a separate line above each named link and joint."""
     document, lines = Document(text, "the corrected URDF"), text.split(b"\n")
     above = {}
     for name, note in notes.items():

@@ -11,7 +11,7 @@ import numpy as np
 
 from robot_dyn import Robot
 from robot_dyn.foundations import Value
-from robot_dyn.tools.identify.base_parameters import BaseParameters
+from robot_dyn.tools.identify.base_parameters import BaseParameters, base_parameters
 from robot_dyn.tools.identify.regression import Fit, Rows, fit
 from robot_dyn.tools.identify.signals import Signals, low_pass
 
@@ -67,9 +67,9 @@ class Model(Value):
         return Y
 
 
-def model_of(arm: Robot, base: BaseParameters) -> Model:
+def model_of(arm: Robot) -> Model:
     """Return the model of an arm; a rotor inertia that base parameters contain already is left out."""
-    rng = np.random.default_rng(1)
+    base, rng = base_parameters(arm), np.random.default_rng(1)
     q, v, a = rng.uniform(-np.pi, np.pi, (3, 200, arm.n))
     Y = np.asarray(arm.regressor(q, v, a))[..., base.columns].reshape(200 * arm.n, -1)
     distinct = []
@@ -107,7 +107,7 @@ class Estimate(Value):
 def estimate(
     model: Model, log: Log, signals: Signals, slow: np.ndarray, check: Callable[..., None] = lambda *_: None
 ) -> Estimate:
-    """Return the estimate from a log; `check` is called with the rows, the motion and the torques before the fit.
+    """Return the estimate from a log; `check` is called with the rows and the motion before the fit.
 
     Rows of a joint slower than `slow`, (n,), and rows within the filter's memory of such rows, are left out.
     """
@@ -117,35 +117,31 @@ def estimate(
         cutoff = _SMOOTH * signals.cutoff_hz * signals.step_s
         instruments = signals.rates(low_pass(log.q, cutoff))
     else:
-        instruments = tuple(x[:: signals.every] for x in log.reference)
-    names, full = (*model.names, TIME), model.columns(*state)
+        desired_q, desired_v, desired_a = (x[:: signals.every] for x in log.reference)
+        instruments = desired_q, desired_v, desired_a
     independent = model.columns(*instruments)
-    Y, Z = signals.second(full), signals.second(independent)
-    moving = np.abs(state[1]) > slow
-    used = signals.second_of(_eroded(moving, signals))
-    known = state[2] * model.known_rotors
-    rate = np.gradient(tau, signals.step_s, axis=0)
+    Y, Z = signals.second(model.columns(*state)), signals.second(independent)
+    used = signals.second_of(_eroded(np.abs(state[1]) > slow, signals))
+    rate, known = np.gradient(tau, signals.step_s, axis=0), state[2] * model.known_rotors
     at, times, delta = signals.row_times, signals.times, 0.0
-    values = None
+
+    def rows_at(delta: float, values: np.ndarray | None) -> Rows:
+        """Return the rows with torques shifted by a time offset; its instrument is the torque of `values`."""
+        shifted, rates = (np.stack([np.interp(at + delta, times, x) for x in y.T], axis=1) for y in (tau, rate))
+        of_model = rates if values is None else np.gradient(independent @ values, signals.row_step_s, axis=0)
+        regressor, instrument = (
+            np.concatenate([A, signals.second(x)[..., None]], axis=2) for A, x in ((Y, rates), (Z, of_model))
+        )
+        return Rows((*model.names, TIME), regressor, instrument, signals.second(shifted - known), used)
+
+    rows = rows_at(delta, None)
+    check(rows, *map(signals.second_of, state))
+    result = fit(rows)
     for _ in range(_ITERATIONS):
-        shifted = np.stack([np.interp(at + delta, times, x) for x in tau.T], axis=1)
-        rates = np.stack([np.interp(at + delta, times, x) for x in rate.T], axis=1)
-        predicted = (
-            rates if values is None else np.gradient(independent @ values, signals.step_s * signals.every, axis=0)
-        )
-        rows = Rows(
-            names,
-            np.concatenate([Y, signals.second(rates)[..., None]], axis=2),
-            np.concatenate([Z, signals.second(predicted)[..., None]], axis=2),
-            signals.second(shifted - known),
-            used,
-        )
-        if values is None:
-            check(rows, *map(signals.second_of, state), signals.second_of(shifted))
+        delta = float(np.clip(delta - result.values[-1], -_LATEST_S, _LATEST_S))
+        rows = rows_at(delta, result.values[:-1])
         result = fit(rows)
-        step = result.values[-1]
-        values, delta = result.values[:-1], float(np.clip(delta - step, -_LATEST_S, _LATEST_S))
-        if abs(step) < _SAME_S or abs(delta) == _LATEST_S:
+        if abs(result.values[-1]) < _SAME_S or abs(delta) == _LATEST_S:
             break
     result = replace(result, values=np.append(result.values[:-1], delta))
     return Estimate(result, rows, signals.second_of(at), signals, state, instruments)

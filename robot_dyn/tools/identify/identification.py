@@ -11,9 +11,8 @@ import numpy as np
 from robot_dyn import Robot
 from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.foundations import instance, number, numbers
+from robot_dyn.foundations import instance, number, numbers, several, shown
 from robot_dyn.report import processor_and_versions
-from robot_dyn.tools.identify.base_parameters import base_parameters
 from robot_dyn.tools.identify.corrected import corrected
 from robot_dyn.tools.identify.estimation import COULOMB, VISCOUS, Estimate, Model, estimate, model_of
 from robot_dyn.tools.identify.log import Log, LogError, read_log, swapped
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
 CUTOFF_HZ = 8.0
 _SLOW = 0.05  # of the largest speed of a joint
 _TRAINING = 0.75  # part of the log, at its start, that fits the numbers of the held-out error
+_PERIODS = 10  # of the cutoff, in a log
 _LEAST_ROWS = 20  # of a joint
 _DEPENDENT = 1e-7  # least singular value of columns of unit length
 _FOREIGN = 0.5  # held-out error, of the torque's deviation, of a log of another arm
@@ -36,7 +36,7 @@ _FOREIGN = 0.5  # held-out error, of the torque's deviation, of a log of another
 
 def identify(
     arm: Robot,
-    log: Any,
+    log: object,
     *,
     reference: PiecewisePolynomial | None = None,
     gains: ArrayLike | None = None,
@@ -82,31 +82,35 @@ def identify(
     parameters = tuple(_parameters(model, result))
     friction = _identified_friction(model, result)
     robot, text = _corrected(arm, links, theta, friction, parameters, model, result)
+    determined, blind = _determined(model, result, links, theta)
+    confounded = (joint for i, joint in enumerate(arm.joint_names) if i not in model.rotors)
     return Identification(
-        arm.name,
-        parameters,
-        *_determined(model, result, links, theta),
-        tuple(
-            f"rotor inertia of {name} with {name} Izz"
-            for i, name in enumerate(arm.joint_names)
-            if i not in model.rotors
-        ),
-        float(result.fit.values[-1]),
-        float(result.fit.half_widths[-1]),
-        held_out,
-        verdict_of(model, links, result, stated),
-        record.reference is not None,
-        cutoff_hz,
-        processor_and_versions(),
-        robot,
-        text,
+        arm=arm.name,
+        parameters=parameters,
+        determined=determined,
+        blind=blind,
+        confounded=tuple(f"rotor inertia of {joint} with {joint} Izz" for joint in confounded),
+        time_offset_s=float(result.fit.values[-1]),
+        time_offset_half_width_s=float(result.fit.half_widths[-1]),
+        held_out=held_out,
+        verdict=verdict_of(model, links, result, stated),
+        has_reference=record.reference is not None,
+        cutoff_hz=cutoff_hz,
+        environment=processor_and_versions(),
+        robot=robot,
+        urdf=text,
     )
 
 
 def estimated(arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None) -> tuple[Model, Estimate]:
     """Return the linear model of an arm and its estimate from a log; for arguments and errors see `identify`."""
     cutoff_hz = number("cutoff_hz", cutoff_hz, above=0, error=LogError)
-    model = model_of(arm, base_parameters(arm))
+    if not _PERIODS / np.ptp(log.t) <= cutoff_hz <= 0.5 / log.step_s:
+        raise LogError(
+            f"cutoff_hz must be from {_PERIODS / np.ptp(log.t):.3g} Hz, for {np.ptp(log.t):.4g} s, to"
+            f" {0.5 / log.step_s:.4g} Hz, half the rate of the log; got {cutoff_hz:g}"
+        )
+    model = model_of(arm)
     signals = Signals(float(log.t[0]), log.step_s, len(log.t), cutoff_hz)
     speed = np.abs(np.gradient(signals.first(log.q), log.step_s, axis=0)).max(axis=0)
     least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
@@ -118,7 +122,9 @@ def _friction(arm: Robot, effects: Iterable[Effect] | None) -> np.ndarray | None
     if effects is None:
         return None
     result = np.zeros((2, arm.n))
-    for effect in effects:
+    if (given := several(effects)) is None:
+        raise LogError(f"effects must be a list of friction, got {shown(effects)}")
+    for effect in given:
         if isinstance(effect, ViscousFriction):
             result[0] += effect.viscous
         elif isinstance(effect, DryFriction | RegularisedCoulombFriction):
@@ -131,8 +137,8 @@ def _friction(arm: Robot, effects: Iterable[Effect] | None) -> np.ndarray | None
 def _refuse(arm: Robot) -> Any:
     """Return a check of rows before a fit."""
 
-    def check(rows: Rows, q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.ndarray) -> None:
-        for i, j in swapped(tau, np.asarray(arm.inverse_dynamics(q, v, a)), v):
+    def check(rows: Rows, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
+        for i, j in swapped(rows.tau, np.asarray(arm.inverse_dynamics(q, v, a)), v):
             names = arm.joint_names
             raise LogError(
                 f"the torques of {names[i]} and {names[j]} seem to be swapped: each follows the model of the other;"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 TORQUES = ("tau", "torque", "effort", "u")
 _STILL = 1e-3  # [rad] or [m]: range of a joint that does not move
 _STUCK, _STUCK_PART = 5, 0.01  # equal samples in a row at an extreme, and their part of a log
+_GAINS = 1e-4, 1e6  # [N m/A]
 _LEAST = 50  # samples
 
 
@@ -55,7 +56,7 @@ class Log(Value):
 
 
 def read_log(
-    arm: Robot, source: Any, reference: PiecewisePolynomial | None = None, gains: ArrayLike | None = None
+    arm: Robot, source: object, reference: PiecewisePolynomial | None = None, gains: ArrayLike | None = None
 ) -> Log:
     """Return the log in a source.
 
@@ -97,7 +98,7 @@ def read_log(
     return Log(times_even, evenly(t, q, times_even), evenly(t, tau, times_even), along)
 
 
-def _spread(arm: Robot, source: Any) -> Any:
+def _spread(arm: Robot, source: object) -> Any:
     """Return a source whose arrays (m, n) are columns by joint."""
     if isinstance(source, Trajectory):
         return source.table()
@@ -132,7 +133,10 @@ def _torques(arm: Robot, table: Mapping[str, np.ndarray], columns: Mapping[str, 
         raise LogError(f"{kinds[0]} {arm.joint_names[i]}: sample {k + 1} is {tau[k, i]}; remove the sample")
     if gains is None:
         return tau
-    return tau * numbers("gains", gains, (), (arm.n,), error=LogError)
+    factors = numbers("gains", gains, (), (arm.n,), error=LogError)
+    if not ((_GAINS[0] <= np.abs(factors)) & (np.abs(factors) <= _GAINS[1])).all():
+        raise LogError(f"gains must be from {_GAINS[0]:g} to {_GAINS[1]:g} N m/A, got {factors.tolist()}")
+    return tau * factors
 
 
 def _refuse(arm: Robot, q: np.ndarray, tau: np.ndarray) -> None:

@@ -93,12 +93,16 @@ def stated_parameters(arm: Robot, link: str) -> np.ndarray:
     return np.zeros(10)
 
 
-def pseudo_inertia(theta: Any, bmat: Any = np.block, trace: float = 0.5) -> Any:
-    """Return P, (4, 4), of parameters (10,); `bmat` joins blocks of arrays or of cvxpy expressions."""
+def pseudo_inertia(theta: np.ndarray) -> np.ndarray:
+    """Return P, (4, 4), of parameters (10,)."""
+    return np.array(_entries(theta))
+
+
+def _entries(theta: Any) -> list[list[Any]]:
+    """Return the entries of P of parameters (10,), numbers or expressions of cvxpy."""
     m, x, y, z, Ixx, Ixy, Iyy, Ixz, Iyz, Izz = (theta[k] for k in range(10))
-    half = trace * (Ixx + Iyy + Izz)
-    rows = [[half - Ixx, -Ixy, -Ixz, x], [-Ixy, half - Iyy, -Iyz, y], [-Ixz, -Iyz, half - Izz, z], [x, y, z, m]]
-    return bmat(rows)
+    half = (Ixx + Iyy + Izz) / 2
+    return [[half - Ixx, -Ixy, -Ixz, x], [-Ixy, half - Iyy, -Iyz, y], [-Ixz, -Iyz, half - Izz, z], [x, y, z, m]]
 
 
 def physical(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -119,7 +123,7 @@ def physical(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.nda
     objective = cp.sum_squares(data)
     for i in range(N):
         objective += cp.sum_squares(_metric(links.theta[i], sizes[i]) @ (x[i] - links.theta[i] / sizes[i])) / SPREAD**2
-    possible = [pseudo_inertia(x[i], cp.bmat) >> _MARGIN * np.eye(4) for i in range(N)]
+    possible = [cp.bmat(_entries(x[i])) >> _MARGIN * np.eye(4) for i in range(N)]
     problem = cp.Problem(cp.Minimize(objective), possible)
     try:
         problem.solve(solver=cp.CLARABEL)

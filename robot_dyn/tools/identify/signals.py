@@ -48,6 +48,11 @@ class Signals(Value):
         return max(1, int(1 / (self.step_s * _ROWS * self.cutoff_hz)))
 
     @property
+    def row_step_s(self) -> float:
+        """Time between two evaluations of the regressor, in [s]."""
+        return self.step_s * self.every
+
+    @property
     def row_times(self) -> np.ndarray:
         """Times of the evaluations of the regressor, (k,), in [s]."""
         return self.times[:: self.every]
@@ -55,7 +60,7 @@ class Signals(Value):
     @cached_property
     def stride(self) -> int:
         """Evaluations in the time between two rows: after the filter, rows this far apart are nearly independent."""
-        return max(1, int(1 / (2 * self.cutoff_hz * self.step_s * self.every)))
+        return max(1, int(1 / (2 * self.cutoff_hz * self.row_step_s)))
 
     def first(self, x: np.ndarray) -> np.ndarray:
         """Return samples, (m, ...), after the first filter."""
@@ -63,11 +68,11 @@ class Signals(Value):
 
     def second(self, x: np.ndarray) -> np.ndarray:
         """Return rows, (k, ...), after the second filter: fewer rows, without the ends."""
-        return self.second_of(low_pass(x, self.cutoff_hz * self.step_s * self.every))
+        return self.second_of(low_pass(x, self.cutoff_hz * self.row_step_s))
 
     def second_of(self, x: np.ndarray) -> np.ndarray:
         """Return the rows of `second`, (k, ...), without a filter."""
-        edge = int(_EDGE / (self.cutoff_hz * self.step_s * self.every)) + 1
+        edge = int(_EDGE / (self.cutoff_hz * self.row_step_s)) + 1
         return x[edge : len(x) - edge : self.stride]
 
     def rates(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

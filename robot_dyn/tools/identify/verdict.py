@@ -2,8 +2,8 @@
 
     r = τ − Y θ_file,   χ²(cause) = min_x ‖W (r − C x)‖²,   BIC = χ² + k log N
 
-C are the derivatives of the torque by the cause. Causes whose BIC differs by less than 6 cannot be told apart by the
-log and are named together. [Schwarz 1978; Kass, Raftery 1995]
+C are the derivatives of the torque by the cause. Causes whose BIC differs by less than 6 are not distinguished by
+the log and are named together. [Schwarz 1978; Kass, Raftery 1995]
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Verdict(Value):
 
     @property
     def first(self) -> tuple[Cause, ...]:
-        """The most probable cause, with those that the log cannot distinguish from it; empty if none is seen."""
+        """The most probable cause, with those that the log cannot distinguish from it; empty if nothing is seen."""
         return tuple(x for x in self.causes if x.bic - self.causes[0].bic < SAME) if self.seen else ()
 
 
@@ -99,7 +99,7 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
         model: Model of the log.
         links: Links of the arm.
         found: Estimate of all parameters, which gives the noise.
-        friction: Viscous and Coulomb friction that the arm is said to have, (2, n); None if it is fitted with each
+        friction: Viscous and Coulomb friction that the arm is supposed to have, (2, n); None if it is fitted with each
             cause, which then cannot be friction.
     """
     signals, rows, n = found.signals, found.rows, model.arm.n

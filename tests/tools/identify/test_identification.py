@@ -12,13 +12,20 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
-from robot_dyn.tools.identify import Identification, LogError, identify
-from robot_dyn.tools.identify.base_parameters import base_parameters
-from robot_dyn.tools.identify.estimation import estimate, model_of
-from robot_dyn.tools.identify.log import read_log
-from robot_dyn.tools.identify.physical import links_of, physical, pseudo_inertia
-from robot_dyn.tools.identify.regression import Fit
-from robot_dyn.tools.identify.signals import Signals, low_pass
+from robot_dyn.tools.identify import (
+    Fit,
+    Identification,
+    LogError,
+    Signals,
+    estimate,
+    identify,
+    links_of,
+    low_pass,
+    model_of,
+    pseudo_inertia,
+    read_log,
+)  # fmt: skip
+from robot_dyn.tools.identify.physical import physical
 from tests.command import spawn
 from tests.tools.identify import logs
 
@@ -32,7 +39,7 @@ def result(seed: int = 0, **options: Any) -> Identification:
 
 @cache
 def truth() -> dict[str, float]:
-    base = base_parameters(logs.FILE)
+    base = model_of(logs.FILE).base
     values = dict(zip(base.names, base.R @ logs.true_arm().inertial_parameters, strict=True))
     for joint, b, f in zip(JOINTS, logs.VISCOUS, logs.COULOMB, strict=True):
         values |= {f"{joint} viscous": b, f"{joint} coulomb": f, f"{joint} torque offset": 0.0}
@@ -43,7 +50,7 @@ def truth() -> dict[str, float]:
 @cache
 def fits() -> tuple[Fit, ...]:
     """Return the fits of 10 runs, without the parts of `identify` that follow."""
-    model, along = model_of(logs.FILE, base_parameters(logs.FILE)), logs.reference()
+    model, along = model_of(logs.FILE), logs.reference()
     made = []
     for seed in range(10):
         log = read_log(logs.FILE, logs.log(seed), along)
@@ -84,7 +91,7 @@ def test_bodies_are_possible_and_equal_the_file_where_the_log_is_blind() -> None
     """With the file's own base parameters the nearest bodies are the file's, to 1e-4 of their size (the solver)."""
     for name in ("planar_2r", "ur5"):
         arm = rd.load(name)
-        base, links = base_parameters(arm), links_of(arm)
+        base, links = model_of(arm).base, links_of(arm)
         theta = physical(links, base.R, base.R @ arm.inertial_parameters, np.eye(len(base.R)) * 1e-4)
         assert np.allclose(theta / links.sizes, links.theta / links.sizes, atol=1e-3)
         noisy = base.R @ arm.inertial_parameters + np.random.default_rng(0).normal(size=len(base.R)) * 0.3
