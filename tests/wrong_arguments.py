@@ -39,7 +39,8 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 RESULTS = {
     "Advice", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation", "ExpectedPrecision",
     "HeldOut", "Identification", "InverseKinematics", "MotorBudget", "Motors",
-    "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State",
+    "Parameter", "PathPlan", "PayloadEstimate",
+    "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "State",
     "StaticEstimate", "Stress", "SweepResult",
     "Trajectory", "Verdict", "WorkPrecision",
 }  # fmt: skip

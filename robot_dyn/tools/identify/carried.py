@@ -188,7 +188,9 @@ def _nearest_body(W: np.ndarray, z: np.ndarray) -> np.ndarray:
     needs("clarabel", extra="identify")
     x = cp.Variable(10)
     objective = cp.sum_squares(W @ x - z) + _PULL**2 * cp.sum_squares(x)
-    problem = cp.Problem(cp.Minimize(objective), [pseudo_inertia(x, cp.bmat) >> _MARGIN * np.eye(4)])
+    units = np.stack([pseudo_inertia(unit).ravel() for unit in np.eye(10)], axis=1)  # P is linear
+    P = cp.reshape(units @ x, (4, 4), order="C")
+    problem = cp.Problem(cp.Minimize(objective), [P >> _MARGIN * np.eye(4)])
     problem.solve(solver=cp.CLARABEL)
     if x.value is None:
         raise LogError(f"no possible body fits the log ({problem.status}); check the units of the torques")
