@@ -11,7 +11,7 @@ Results             Trajectory, Rollouts; RobotDynError, ModelWarning, Precision
 
 Subpackages, whose docstrings list their contents: effects (friction, springs, stops, limits, …), control (controllers,
 references, recorded motions, inverse kinematics), integrate (methods), accuracy (work-precision diagrams, certificates,
-costs) and tools (doctor of files, motors, sweeps, proofs, stress tests, steps).
+costs) and tools (doctor of files, motors, sweeps, proofs, stress tests, steps, exports).
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def write() -> None:
     worsts = {}
     for robot, result in results.items():
         for quantity, agreement in result.quantities.items():
-            worsts[quantity] = max((agreement.share, robot, agreement), worsts.get(quantity, (-1.0,)))
+            worsts[quantity] = max((agreement.tolerance_fraction, robot, agreement), worsts.get(quantity, (-1.0,)))
     rows, exact = [], []
     for quantity, (_, robot, worst) in worsts.items():
         if worst.error:

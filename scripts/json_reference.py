@@ -30,6 +30,7 @@ from robot_dyn.model.info import Info
 from robot_dyn.simulation.observation.remarks import RemarkKind
 from robot_dyn.simulation.rollouts.parameters import Parameters
 from robot_dyn.tools.doctor.checkup import Checkup
+from robot_dyn.tools.export.source import CSource
 from robot_dyn.tools.motors.motor_budget.fastest import FastestMotion
 from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
@@ -162,6 +163,7 @@ DOCUMENTS = (
     Document("certify ROBOT", Certificate),
     Document("prove SCENE.toml", Proof),
     Document("stress ROBOT", Stress),
+    Document("export-c ROBOT", CSource),
     Document("cost SCENE.toml", Cost),
     Document("advise SCENE.toml", Advice),
     Document("cache", CacheDocument),

@@ -29,5 +29,5 @@ class OwnImplicit(Integrator):
         try:
             k = np.linalg.solve(W, system.rate(t + h, y)[..., None])[..., 0]
         except np.linalg.LinAlgError:
-            raise IntegrationError("1 − h J is singular: take a smaller step", t) from None
+            raise IntegrationError("1 − h J is singular: use a smaller step", t) from None
         return y + h * k

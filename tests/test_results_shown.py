@@ -112,13 +112,15 @@ def test_a_checkup_has_a_row_for_each_finding() -> None:
         for row in html.fragment_fromstring(made("check")._repr_html_()).iter("tr")
     ]
     assert rows[1:] == [
-        [x.severity.value, x.where, "" if x.line is None else str(x.line), x.what, x.remedy]
+        [x.severity.value, x.where, "" if x.line is None else str(x.line), x.message, x.remedy]
         for x in made("check").findings
     ]
 
 
 def test_marks_on_a_logarithmic_axis_stand_where_the_logarithm_says() -> None:
-    shares = {each.quantity: each.share for each in made("compare").agreements if each.share > 0}
+    shares = {
+        each.quantity: each.tolerance_fraction for each in made("compare").agreements if each.tolerance_fraction > 0
+    }
     tree = html.fragment_fromstring(made("compare")._repr_html_())
     (levels,) = (each for each in tree.iter("g") if each.get("id") == "levels")
     at = [float(mark.get("x")) for mark in levels.iter("use")]

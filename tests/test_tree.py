@@ -91,7 +91,6 @@ FOLDERS = sorted(path.parent.relative_to(ROOT).as_posix().replace("/", ".") for 
 
 # Modules of the core, besides what its folders list, that a tool imports, each with the reason.
 EXCEPTIONS = {
-    ("proof", "robot_dyn.codegen.program"): "a proof runs the instructions of compiled programs on sets",
     ("proof", "robot_dyn.codegen.trace.base_parameters"): "the equation of a proof has the fewest parameters",
     ("proof", "robot_dyn.codegen.trace.condition"): "functions of users are traced on nodes with conditions",
     ("proof", "robot_dyn.codegen.trace.origins"): "the equation of a proof has the fewest terms",
@@ -206,7 +205,7 @@ def test_tests_import_few_names_that_no_folder_lists() -> None:
     assert len(places) <= MOST_INTERNAL
 
 
-TOOL_NAMES = ("doctor", "identify", "motors", "proof", "step", "stress", "sweeps")
+TOOL_NAMES = ("doctor", "export", "identify", "motors", "proof", "step", "stress", "sweeps")
 ROOMS = ("effects", "control", "integrate", "accuracy", "tools", *(f"tools.{name}" for name in TOOL_NAMES))
 
 

@@ -16,11 +16,11 @@ class TwoRates(rd.control.Controller):
     """u = PD + u_slow, with u_slow = PD_slow at each r-th tick and held between; z counts ticks and holds u_slow."""
 
     reference: rd.control.PiecewisePolynomial
-    kp: Any = field(metadata=rd.effects.coefficient("N m/rad", least=0))
-    kd: Any = field(metadata=rd.effects.coefficient("N m s/rad", least=0))
+    kp: Any = field(metadata=rd.effects.coefficient("N m/rad", minimum=0))
+    kd: Any = field(metadata=rd.effects.coefficient("N m s/rad", minimum=0))
     slow_target: tuple[float, ...]
-    slow_kp: Any = field(metadata=rd.effects.coefficient("N m/rad", least=0))
-    slow_kd: Any = field(metadata=rd.effects.coefficient("N m s/rad", least=0))
+    slow_kp: Any = field(metadata=rd.effects.coefficient("N m/rad", minimum=0))
+    slow_kd: Any = field(metadata=rd.effects.coefficient("N m s/rad", minimum=0))
     ratio: int
     period_s: float
     term = "kp (q_d − q) + kd (v_d − v) + u_slow"

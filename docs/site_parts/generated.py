@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from site_parts import commands, gallery, hard_cases, reasons, rooms
+from site_parts import commands, findings, gallery, hard_cases, reasons, rooms
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,6 +26,7 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "commands": commands.page,  # the commands, from the command line itself
     "hard cases": hard_cases.page,  # counts from docs/data/hard_cases.json, laws from tests/campaigns/hard
     "reasons": reasons.page,  # why a run ended, from the docstrings of Reason
+    "finding kinds": findings.page,  # what check-urdf reports, from the docstrings of FindingKind
     "gallery": gallery.page,  # the scripts of docs/gallery
     "root file": root_file,
 }

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from enum import Enum
 from inspect import getsource
 from textwrap import dedent
+from typing import TypeVar
 
 from robot_dyn.simulation import Outcome, Reason
 
+E = TypeVar("E", bound=Enum)
 _STEP = {"step_s": 0.002, "period_s": 0.01}
 _LARGEST = {"largest": 3.2e101}
 EXAMPLES = {
@@ -30,7 +33,7 @@ EXAMPLES = {
         "remedy": "Rodas5P, softer effects or a larger tolerance",
     },
     Reason.STAGES_NOT_FOUND: {
-        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a "
+        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: use a "
         "smaller step, or a method for stiff systems"
     },
     Reason.EVENTS_ACCUMULATE: {
@@ -49,19 +52,19 @@ def page(_: str) -> str:
     return "\n".join(_page())
 
 
-def docstrings() -> dict[Reason, str]:
-    """Return the docstring of each member: the string after its assignment."""
-    (tree,) = ast.parse(dedent(getsource(Reason))).body
+def docstrings(kind: type[E]) -> dict[E, str]:
+    """Return the docstring of each member of an enumeration: the string after its assignment."""
+    (tree,) = ast.parse(dedent(getsource(kind))).body
     assert isinstance(tree, ast.ClassDef)
     found = {}
     for name, text in zip(tree.body, tree.body[1:], strict=False):
         if isinstance(name, ast.Assign) and isinstance(text, ast.Expr):
-            found[Reason[ast.unparse(name.targets[0])]] = dedent("    " + ast.literal_eval(text.value)).strip()
+            found[kind[ast.unparse(name.targets[0])]] = dedent("    " + ast.literal_eval(text.value)).strip()
     return found
 
 
 def _page() -> Iterator[str]:
-    texts = docstrings()
+    texts = docstrings(Reason)
     for reason in Reason:
         example = Outcome(reason, 0.137, "elbow_joint", dict(EXAMPLES.get(reason, {})))
         yield f"## {reason}"

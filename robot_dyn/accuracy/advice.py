@@ -50,7 +50,7 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 
 _PILOT_STATES = 9  # along the pilot run
-_FAST_STATES = 3  # of these, the fastest ones, at which limits are computed
+_FAST_STATES = 3  # number of these states, the fastest ones, at which limits are computed
 _MAX_STEPS = 200_000  # in a run for the error estimate
 _MAX_GROWTH = 1e3  # largest growth of deviations over such a run
 
@@ -64,7 +64,7 @@ class Advice(Answer):
 
     Attributes:
         method: The method of the setup.
-        step_s: Its longest step, in [s]; 0 if the method chooses its steps.
+        step_s: Longest step of the method, in [s]; 0 if the method chooses its steps.
         fastest: The fastest motion along the pilot run, with joint and source.
         at_s: Time of that motion, in [s].
         limits: Longest stable step of the setup's method and of every other fixed-step method, in [s]; inf if every
@@ -108,8 +108,8 @@ class Advice(Answer):
 
     def blocks(self) -> Iterator[Block]:
         yield from self.text.split("\n")
-        rows = tuple((name, f"{h:.3g}" if isfinite(h) else "every step") for name, h in self.limits.items())
-        yield Table(("method", "stable up to a step of [s]"), rows, right=("stable up to a step of [s]",))
+        rows = tuple((name, f"{h:.3g}" if isfinite(h) else "any") for name, h in self.limits.items())
+        yield Table(("method", "longest stable step [s]"), rows, right=("longest stable step [s]",))
 
     @property
     def drawing(self) -> str:
@@ -130,9 +130,9 @@ class Advice(Answer):
     def _of_step(self) -> str:
         limit = self.limits.get(self.method, inf)
         if not self.step_s:
-            return f"{self.method} adapts its steps, which keeps the run stable"
+            return f"method {self.method}: error control keeps the steps stable"
         if not isfinite(limit):
-            return f"step {self.step_s:.3g} s: stable; every step of {self.method} is stable here"
+            return f"step {self.step_s:.3g} s: stable; {self.method} is stable here at every step"
         if self.step_s <= limit:
             return f"step {self.step_s:.3g} s: stable; {self.method} is stable up to {limit:.3g} s"
         best = max(FIXED_STEP, key=lambda name: (min(self.limits[name], 2 * self.step_s), method(name).order))
@@ -152,34 +152,38 @@ class Advice(Answer):
         elif unstable:
             verdict = f"; the loop is stable up to {limit:.3g} s: use period_s={below(limit)}, or lower gains"
         elif self.period_s > limit:
-            verdict = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
+            verdict = f"; some shorter periods are unstable: the loop is stable up to {limit:.3g} s"
         else:
             verdict = f"; the loop is stable up to {limit:.3g} s" if isfinite(limit) else "; every period is stable"
         if marginal and self.period_s <= limit:
             verdict = (
-                f"; none grows up to a period of {limit:.3g} s" if isfinite(limit) else "; none grows at any period"
+                f"; no deviation grows up to a period of {limit:.3g} s"
+                if isfinite(limit)
+                else "; no deviation grows at any period"
             )
-        cause = ", some deviations neither decay nor grow, for example of a joint held by dry friction" * marginal
+        cause = (
+            ", because some deviations neither decay nor grow, for example at a joint held by dry friction" * marginal
+        )
         yield f"control period {self.period_s:.3g} s: {self.at_period}{cause}{verdict}"
 
     def _of_growth(self) -> Iterator[str]:
         if not self.stable:
             per_period = f", by {shown(self.period_growth)} in each period" * (self.at_period is Stability.UNSTABLE)
-            yield f"over this run deviations grow by {shown(self.growth)}{per_period}"
+            yield f"deviations grow by a factor of {shown(self.growth)} over this run{per_period}"
 
     def _of_error(self) -> str:
         if self.run is None:
-            return "error to expect: not estimated, because deviations grow too much or the run has too many steps"
+            return "expected error: not estimated, because deviations grow too fast or the run has too many steps"
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
             return f"the run {end.ending} at {end.t:.3g} s: {end.text}"
         unit = joint_units("q", joint_types(self.run))
-        return f"error of q [{unit}] to expect: {self.run.error}"
+        return f"expected error of q [{unit}]: {self.run.error}"
 
 
 @takes_options
 def advise(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     **options: Unpack[Options],
@@ -187,15 +191,15 @@ def advise(
     """Report whether the step and the control period of a setup are short enough, and estimate the error.
 
     Args:
-        what: A setup, or a plant or robot with a start, see `simulate`.
-        q0: Initial position, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        system: A setup, or a plant or robot with a start, see `simulate`.
+        q0: Initial position, (n,), in [rad] or [m] by joint; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         **options: Options of the setup, see `simulate`.
 
     Raises:
         QueryError: If the setup is not allowed, or its motion cannot be linearised at any state of the pilot run.
     """
-    setup = setup_of("advise", what, {**starts(q0, v0), **options})
+    setup = setup_of("advise", system, {**starts(q0, v0), **options})
     advice = advice_about(setup, _pilot_states)
     worthwhile = advice.growth < _MAX_GROWTH and (setup.method.controls_error or setup.steps <= _MAX_STEPS)
     return replace(advice, run=simulate(replace(setup, estimate_error=True))) if worthwhile else advice

@@ -64,7 +64,10 @@ def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
     robot = warn_below(robot, None)
     requested = QUANTITIES[choice("quantity", quantity, QUANTITIES)]
     if len(state) != len(requested.arguments):
-        raise QueryError(f"digits of {requested.name} take {', '.join(requested.arguments)}; got {len(state)} of them")
+        raise QueryError(
+            f"digits of {requested.name} need the arguments {', '.join(requested.arguments)}; got {len(state)}"
+            f" arguments"
+        )
     arrays = {
         name: np.array(shaped(name, x, robot.joint_names), float)
         for name, x in zip(requested.arguments, state, strict=True)
@@ -109,7 +112,7 @@ class DigitCheck:
     def __post_init__(self) -> None:
         digits = number("digits", self.digits, above=0)
         if digits > MOST_DIGITS:
-            raise QueryError(f"digits must be at most {MOST_DIGITS}, the most that are counted, got {digits:g}")
+            raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}")
         object.__setattr__(self, "digits", digits)
 
     def __call__(self, robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:

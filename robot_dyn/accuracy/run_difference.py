@@ -134,7 +134,7 @@ class RunDifference(Result):
             rows = tuple((setting.name, setting.a, setting.b) for setting in self.settings)
             yield Table(("setting", "a", "b"), rows, wrap=True)
         else:
-            yield "no setting differs"
+            yield "all settings are equal"
         yield ""
 
 

@@ -47,7 +47,7 @@ def program() -> Any:
     """
     for topic in _TOPICS:
         import_module(f"robot_dyn.cli.commands.{topic}")
-    for entry in entry_points(group="robot_dyn.commands"):  # of plug-ins
+    for entry in entry_points(group="robot_dyn.commands"):  # commands of plug-ins
         entry.load()
     order = {group: k for k, group in enumerate(GROUPS)}
     app.registered_commands.sort(key=lambda subcommand: order.get(str(subcommand.rich_help_panel), len(order)))

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup
 
 
-def scene(what: str, given: Mapping[str, object]) -> Setup | None:
+def scene(source: str, robot_options: Mapping[str, object]) -> Setup | None:
     """The setup of a scene file; None for a robot. QueryError for options that a scene states itself."""
     import robot_dyn as rd
 
-    if not what.lower().endswith(".toml"):
+    if not source.lower().endswith(".toml"):
         return None
-    if of_robots := [name for name, value in given.items() if value]:
-        raise QueryError(f"{of_robots[0]}: is for a robot; a scene states its own, so leave it out")
-    return rd.read_scene(what)
+    if of_robots := [name for name, value in robot_options.items() if value]:
+        raise QueryError(f"{of_robots[0]}: applies to a robot; a scene defines its own, so remove it")
+    return rd.read_scene(source)
 
 
 def run(path: str) -> Trajectory:
@@ -33,17 +33,17 @@ def run(path: str) -> Trajectory:
     result = rd.read(path)
     if isinstance(result, rd.Rollouts):
         raise QueryError(
-            f"{path}: is a batch of {len(result)} runs, and one run is needed; save one of them in Python, for example"
+            f"{path}: contains {len(result)} runs, but a single run is needed; save one in Python, for example"
             f" rd.read({path!r})[0].save('run.npz')"
         )
     return result
 
 
-def assignments(option: str, texts: list[str], what: str = "joint") -> dict[str, float]:
+def assignments(option: str, texts: list[str], kind: str = "joint") -> dict[str, float]:
     """Values by joint, or link, of several joint=value; QueryError if one comes twice."""
-    values = {name: number(option, value) for name, value in pairs(option, texts, f"{what.upper()}=VALUE").items()}
+    values = {name: number(option, value) for name, value in pairs(option, texts, f"{kind.upper()}=VALUE").items()}
     if len(values) < len(texts):
-        raise QueryError(f"{option} names a {what} twice: {', '.join(texts)}")
+        raise QueryError(f"{option} names a {kind} twice: {', '.join(texts)}")
     return values
 
 

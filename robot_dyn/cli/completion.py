@@ -41,7 +41,7 @@ def joints(incomplete: str) -> list[str]:
 
 
 def locks(incomplete: str) -> list[str]:
-    """The same names, each followed by `=`, as in JOINT=."""
+    """Names of the movable joints, each followed by `=`."""
     return [f"{name}=" for name in joints(incomplete)]
 
 

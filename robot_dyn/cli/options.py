@@ -42,7 +42,7 @@ Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
 Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
 Repeats = Annotated[int, typer.Option(min=1, help="Largest number of timings of each, within the budget.")]
 Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/reference/json.md.")]
 Positions = Annotated[str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")]
 Effects = Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')]
@@ -66,7 +66,7 @@ class FileOptions:
         mass (LINK=KG): Mass of a link without inertia; its shape gives the inertia; may be repeated.
         total_mass (KG): Mass of the robot, shared by links without inertia, from shapes.
         density (KG/M³): Density of links without inertia, from shapes.
-        allow_overlap: Count what closed parts of a mesh share as often as they fill it.
+        allow_overlap: Count the volume that closed parts of a mesh share once for each part.
     """
 
     package_dir: list[str] | None = None
@@ -129,8 +129,8 @@ class Results:
     """Options for the result of a command: a figure, a table, text or JSON.
 
     Options:
-        output (PLOT.png): Draw it, as a .png, .svg or .pdf.
-        csv (TABLE.csv): Write its rows as a table.
+        output (PLOT.png): Write the figure, as .png, .svg or .pdf.
+        csv (TABLE.csv): Write the rows as a CSV table.
     """
 
     output: str | None = None
@@ -146,7 +146,7 @@ class Results:
         from robot_dyn.view.plots.pictures import PICTURES
 
         if self.dark and not self.output:
-            raise QueryError("--dark is of the figure; add --output PLOT.png, or leave it out")
+            raise QueryError("--dark applies to a figure: add --output PLOT.png, or remove --dark")
         read, paths = [path for path in inputs if path and os.path.isfile(path)], []
         for path, kinds in ((self.output, PICTURES), (self.csv, table_kind(of))):
             if path:

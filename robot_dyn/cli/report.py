@@ -178,7 +178,7 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
     yield from (f"{name} refused: {why}" for name, why in refused.items())
     yield agreed
     if results:
-        name, result = max(results, key=lambda pair: pair[1].worst.share)
+        name, result = max(results, key=lambda pair: pair[1].worst.tolerance_fraction)
         worst = result.worst
         yield f"worst: {name}, {worst.quantity}, {worst.error:.2e} of {worst.tolerance:.1e} allowed, at {worst.entry}"
         if not result.ok:
@@ -209,7 +209,7 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
         quantity = QUANTITIES[choice("quantity", name, QUANTITIES)]
         frames = [frame] if quantity.framed and frame else []
         if quantity.framed and not frames:
-            raise QueryError(f"{name} is a quantity of a frame: give --frame LINK")
+            raise QueryError(f"{name} refers to a frame: add --frame LINK")
         answers[name] = quantity.ask(state.plant.dynamics, vars(state), *frames)
     return answers
 

@@ -28,8 +28,8 @@ class OutputError(RobotDynError):
 
 
 def open_streams() -> None:
-    """Give the process the three streams that it may have been started without; unknown characters become ?."""
-    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:  # else a file opened later would take the place of one
+    """Open the standard streams that are missing; print unknown characters as ?."""
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:  # otherwise a file opened later would get its number
         pass
     os.close(handle)
     if sys.stdout is None:  # closed: writing fails, same as on /dev/full
@@ -58,12 +58,12 @@ def say(*answers: Answer | Table | str) -> None:
 
 
 def _draw(table: Table) -> None:
-    """Print a table on a terminal: texts begin at the left and are broken between words, numbers stand at the right."""
+    """Print a table on a terminal: texts are left-aligned and wrapped between words, numbers are right-aligned."""
     from rich.console import Console
     from rich.table import Table as Grid
 
     console = Console(highlight=False, markup=False, emoji=False)
-    for number, part in enumerate(table.within(console.width)):  # a number that is cut off is another number
+    for number, part in enumerate(table.within(console.width)):  # never truncate a number
         if number:
             console.print()
         grid = Grid(box=None, pad_edge=False, header_style="bold")
@@ -88,8 +88,8 @@ def show(
 
     Args:
         answer: An answer, or a list of answers, tables and texts.
-        as_json: Whether JSON is printed.
-        document: What JSON has, if not the answer.
+        as_json: True to print JSON.
+        document: Value of the JSON document, if it is not the answer.
         more: Further answers by key.
         writes: Functions that write a file and return its path. They are called first: a terminal or pipe may be gone.
     """
@@ -146,7 +146,7 @@ class _ToStderr(logging.Handler):
 
 @contextmanager
 def logged_to_stderr() -> Iterator[None]:
-    """Write what the library logs, such as long waits, to standard error during a block."""
+    """Write messages of the library, such as long waits, to standard error during a block."""
     log, handler = logging.getLogger("robot_dyn"), _ToStderr()
     level, propagates = log.level, log.propagate
     log.setLevel(logging.INFO)

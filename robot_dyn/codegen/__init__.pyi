@@ -1,10 +1,17 @@
 # Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.codegen.dynamics import CompiledDynamics as CompiledDynamics
+from robot_dyn.codegen.dynamics import name_of_dtype as name_of_dtype
+from robot_dyn.codegen.engine import Engine as Engine
 from robot_dyn.codegen.engine import SizeWarning as SizeWarning
 from robot_dyn.codegen.kernel import Kernel as Kernel
 from robot_dyn.codegen.loops.call import MachineFunction as MachineFunction
+from robot_dyn.codegen.parameters import Parameter as Parameter
 from robot_dyn.codegen.plant import CompiledPlant as CompiledPlant
 from robot_dyn.codegen.primitives import INSTEAD as INSTEAD
+from robot_dyn.codegen.program import Kind as Kind
+from robot_dyn.codegen.program import Op as Op
+from robot_dyn.codegen.program import Program as Program
+from robot_dyn.codegen.program import Programs as Programs
 from robot_dyn.codegen.self_check import SelfCheckError as SelfCheckError
 from robot_dyn.codegen.store.cache import CacheWarning as CacheWarning
 from robot_dyn.codegen.store.cache import Store as Store

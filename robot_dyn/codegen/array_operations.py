@@ -83,7 +83,7 @@ def sum_sizes(x: Array, out: Array) -> None:
 def evaluation(f: Function, node: ast.AST, function: Scalar, t: Scalar, *arrays_: ArrayValue) -> Value:
     """Call the function at an address."""
     for argument in arrays_:
-        if not isinstance(argument, ArrayValue) or argument.kind.of != FLOAT or not argument.kind.contiguous:
+        if not isinstance(argument, ArrayValue) or argument.kind.number != FLOAT or not argument.kind.contiguous:
             raise f.refused(node, "an evaluation of arrays that are not contiguous arrays of floats", "copy them first")
     if not f.silent:
         shape = ir.FunctionType(ir.VoidType(), [F64, *[_POINTER] * len(arrays_)])
@@ -163,7 +163,7 @@ def _in_place(rule: vectors.Rule) -> Callable[..., Value]:
 @emits
 def copying(f: Function, node: ast.AST, to: ArrayValue, x: ArrayValue) -> Value:
     """Copy an array into another of the same shape, with any strides."""
-    if to.kind.ndim != x.kind.ndim or to.kind.frozen or to.kind.of != x.kind.of:
+    if to.kind.ndim != x.kind.ndim or to.kind.frozen or to.kind.number != x.kind.number:
         raise f.refused(node, "a copy between arrays of different axes or types", "use arrays of one kind")
     for i in range(to.kind.ndim):
         same = f.builder.icmp_signed("==", to.shape[i].ir, x.shape[i].ir)
@@ -215,7 +215,7 @@ def limitation(f: Function, node: ast.AST, x: ArrayValue, limit: Value) -> Value
     vectors.check(f, node, x, [])
     if f.silent:
         return Scalar(BOOL, UNWRITTEN)
-    b, entry_kind = f.builder, x.kind.of
+    b, entry_kind = f.builder, x.kind.number
     most, less = (
         converted(f, scalar(f, limit, node), entry_kind, node),
         b.fcmp_ordered if entry_kind == FLOAT else b.icmp_signed,

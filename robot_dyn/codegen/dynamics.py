@@ -170,7 +170,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
             answer = self.robot._answer(name, state, None, frame, nan=nan)
             return into(out, np.asarray(answer, self.dtype))
         link = self.robot.description.joint_frames.get(frame[0], frame[0])
-        key = name, link, *map(str, map(Axes.of, frame[1:]))
+        key = name, link, *map(str, map(Axes.from_name, frame[1:]))
         return self.engine.ask(key, state, out, nan, self._otherwise(key))
 
     # --- queries that take half a microsecond and skip `_answer`

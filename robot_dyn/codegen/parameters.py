@@ -31,15 +31,18 @@ Part = tuple[
 ROBOT: Part = ("robot",)
 CONTROLLER: Part = ("controller",)
 _GRAVITY = Coefficient("m/s²", shapes=((3,),))
-_WHEN_SWEPT = {"armature": Coefficient("kg m²", least=0), "mass_scale": Coefficient(shapes=((),), above=0)}
+_WHEN_SWEPT = {
+    "armature": Coefficient("kg m²", minimum=0),
+    "mass_scale": Coefficient(shapes=((),), exclusive_minimum=0),
+}
 _OF_LINK = {
-    "mass": Coefficient("kg", shapes=((),), above=0),
+    "mass": Coefficient("kg", shapes=((),), exclusive_minimum=0),
     "inertia": Coefficient("kg m²", shapes=((3, 3),)),
-    "mass_scale": Coefficient(shapes=((),), above=0),
+    "mass_scale": Coefficient(shapes=((),), exclusive_minimum=0),
 }
 _EDIT_OF = {"mass": "masses", "inertia": "inertias", "mass_scale": "mass_scales"}
 _PAYLOAD = {
-    "mass": Coefficient("kg", shapes=((),), least=0),
+    "mass": Coefficient("kg", shapes=((),), minimum=0),
     "com": Coefficient("m", shapes=((3,),)),
     "inertia": Coefficient("kg m²", shapes=((3, 3),), can_vary=False),
 }

@@ -30,7 +30,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import MissingTimeError
 from robot_dyn.foundations.names_nearest import NamesNearest
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import PLANT, Dynamics
+from robot_dyn.queries.dynamics import EQUATION, PLANT, Dynamics
 from robot_dyn.queries.quantity import Key, title
 
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
@@ -80,14 +80,14 @@ class CompiledPlant(NamesNearest):
             return np.array([np.broadcast_to(method(*row, t=t), state["q"].shape[1:]) for t, *row in rows]), effects
 
         return Engine(
-            self._traced,
+            self.trace,
             {**PLANT},
             SelfCheck(self.dynamics.robot, "the interpreted plant"),
             truth,
             self.dynamics.dtype,
             self.dynamics.engine.threads,
             self.dynamics.engine.store,
-            joined(self._parameters),
+            joined(self.parameters),
         )
 
     @property
@@ -204,34 +204,39 @@ class CompiledPlant(NamesNearest):
         return tuple((vector, array.view(Symbols)) for vector, array in pairs)
 
     @cached_property
-    def _parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """Coefficients of the effects, gravity and payloads, as inputs: changing one requires no compilation."""
         return parameters(self.dynamics.robot, self.plant.effects, None)
 
     @cached_property
     def _numbers(self) -> tuple[tuple[Any, ...], Any]:
         """Parameters as a CasADi vector, if there are any, and as an array of symbols."""
-        vector, array = inputs("p", sum(parameter.size for parameter in self._parameters))
+        vector, array = inputs("p", sum(parameter.size for parameter in self.parameters))
         return (vector,) if len(array) else (), array.view(Symbols)
 
     @cached_property
     def _bodies(self) -> SymbolicDynamics:
         """Rigid bodies with symbolic parameters."""
-        own = [parameter for parameter in self._parameters if parameter.part == ROBOT]
-        return SymbolicDynamics(self.dynamics.robot, own).of(split(self._parameters, self._numbers[1]).get(ROBOT, {}))
+        own = [parameter for parameter in self.parameters if parameter.part == ROBOT]
+        return SymbolicDynamics(self.dynamics.robot, own).with_parameters(
+            split(self.parameters, self._numbers[1]).get(ROBOT, {})
+        )
 
     @cached_property
     def _symbolic(self) -> Plant:
         """Plant with symbolic parameters."""
-        return symbolic_plant(self.plant, self._bodies, split(self._parameters, self._numbers[1]))
+        return symbolic_plant(self.plant, self._bodies, split(self.parameters, self._numbers[1]))
 
     @interrupts_later()
-    def _traced(self, key: Key) -> Traced:
+    def trace(self, key: Key) -> Traced:
+        """Return a query of a plant, or M or C, as a Function of its arguments and of the parameters, if any."""
         quantity, ((t, ts), (q, qs), (v, vs), (u, us)) = title(key), self._inputs
         with Symbolic().scope():
             equation = self._symbolic.equation_of_motion
             torque = sum(equation.torques(ts[0], qs, vs), start=0 * vs)
             formulas: dict[str, Callable[[], Any]] = {
+                "M": lambda: equation.dynamics.M(qs),
+                "C": lambda: equation.dynamics.C(qs, vs),
                 "torque": lambda: torque,
                 "N": lambda: equation.dynamics.N(qs) - torque,
                 "inverse_dynamics": lambda: equation.dynamics.inverse_dynamics(qs, vs, us) - torque,
@@ -240,7 +245,8 @@ class CompiledPlant(NamesNearest):
                 ),
             }
             answer = column(formulas[quantity]())
-        arguments = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]
+        symbols = {"t": t, "q": q, "v": v, "a": u, "u": u}
+        arguments = [*(symbols[name] for name in (EQUATION | PLANT)[quantity].arguments), *self._numbers[0]]
         function = ca.Function("f", arguments, [ca.cse(ca.densify(answer))])
         formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
         return Traced(function, formulation, {formulation: instructions(function)})

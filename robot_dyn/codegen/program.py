@@ -34,7 +34,7 @@ class Kind(Enum):
     MINIMUM = "fmin"
     MAXIMUM = "fmax"
     COPY_SIGN = "copysign"
-    REMAINDER = "fmod"  # of x / y, with the sign of x
+    REMAINDER = "fmod"  # remainder of x / y, with the sign of x
     SQUARE_ROOT = "sqrt"
     HYPOTENUSE = "hypot"
     POWER = "pow"
@@ -45,7 +45,7 @@ class Kind(Enum):
     ARC_SINE = "asin"
     ARC_COSINE = "acos"
     ARC_TANGENT = "atan"
-    ARC_TANGENT_OF_TWO = "atan2"  # of y / x, x the second
+    ARC_TANGENT_OF_TWO = "atan2"  # angle of (x, y); x is the second argument
     HYPERBOLIC_SINE = "sinh"
     HYPERBOLIC_COSINE = "cosh"
     HYPERBOLIC_TANGENT = "tanh"

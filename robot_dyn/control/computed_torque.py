@@ -86,8 +86,8 @@ class ComputedTorque(ModelBased):
     Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
     """
 
-    kp: CoefficientField = field(kw_only=True, metadata=coefficient("1/s²", symbol="kp", least=0))
-    kd: CoefficientField = field(kw_only=True, metadata=coefficient("1/s", symbol="kd", least=0))
+    kp: CoefficientField = field(kw_only=True, metadata=coefficient("1/s²", symbol="kp", minimum=0))
+    kd: CoefficientField = field(kw_only=True, metadata=coefficient("1/s", symbol="kd", minimum=0))
 
     term = "M̂ (a_d + kd ė + kp e) + Ĉ v + N̂"
 

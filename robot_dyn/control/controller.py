@@ -239,7 +239,7 @@ class Stateless(Controller):
         @dataclass(frozen=True)
         class Damped(rd.control.Stateless):
             arm: rd.Robot
-            damping: float = field(metadata=rd.effects.coefficient("N m s/rad", least=0))
+            damping: float = field(metadata=rd.effects.coefficient("N m s/rad", minimum=0))
             n = property(lambda self: self.arm.n)
 
             def torque(self, t, q, v, z):
@@ -286,9 +286,9 @@ def check_sampled(name: str, controller: object) -> None:
         raise ControlError(f"{name} is continuous, but a loop is sampled: give {controller.name} a period_s")
 
 
-def nested(of: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
+def nested(controller: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
     """Return a controller that is an attribute of another one, and the parts of it."""
-    part: Controller = getattr(of, attribute)
+    part: Controller = getattr(controller, attribute)
     below = (Nested(f"{attribute}.{path}", f"{label}{inner}", x) for path, inner, x in part.parts)
     return Nested(attribute, label, part), *below
 

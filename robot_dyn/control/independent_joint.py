@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-STIFFNESS = coefficient("N m/rad", symbol="kp", least=0)
-DAMPING = coefficient("N m s/rad", symbol="kd", least=0)
+STIFFNESS = coefficient("N m/rad", symbol="kp", minimum=0)
+DAMPING = coefficient("N m s/rad", symbol="kd", minimum=0)
 
 
 @final
@@ -92,11 +92,13 @@ class PID(Controller):
     reference: PiecewisePolynomial
     _: KW_ONLY
     kp: CoefficientField = field(metadata=STIFFNESS)
-    ki: CoefficientField = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
+    ki: CoefficientField = field(metadata=coefficient("N m/(rad s)", symbol="ki", minimum=0))
     kd: CoefficientField = field(metadata=DAMPING)
-    effort_limit: CoefficientField = field(default=default(np.inf), metadata=coefficient("N m", above=0, infinite=True))
+    effort_limit: CoefficientField = field(
+        default=default(np.inf), metadata=coefficient("N m", exclusive_minimum=0, infinite=True)
+    )
     tracking_time_s: float | None = field(
-        default=None, metadata=coefficient("s", shapes=((),), above=0, can_vary=False)
+        default=None, metadata=coefficient("s", shapes=((),), exclusive_minimum=0, can_vary=False)
     )
     period_s: float = 0.0
     _middle: OptionalCoefficientField = field(

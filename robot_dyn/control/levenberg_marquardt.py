@@ -75,7 +75,7 @@ def descend(
     return Descent(q, e, J, iterations)
 
 
-def held(q: np.ndarray, e: np.ndarray, J: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def at_bound(q: np.ndarray, e: np.ndarray, J: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Return True for joints at a bound that the descent direction Jᵀ e pushes against, (..., n)."""
     pull = np.swapaxes(J, -1, -2) @ e[..., None]
     return ((q <= lower) & (pull[..., 0] < 0)) | ((q >= upper) & (pull[..., 0] > 0))
@@ -84,7 +84,7 @@ def held(q: np.ndarray, e: np.ndarray, J: np.ndarray, lower: np.ndarray, upper: 
 def _step(
     q: np.ndarray, e: np.ndarray, J: np.ndarray, lower: np.ndarray, upper: np.ndarray, mu: np.ndarray
 ) -> np.ndarray:
-    J = np.where(held(q, e, J, lower, upper)[:, None, :], 0, J)
+    J = np.where(at_bound(q, e, J, lower, upper)[:, None, :], 0, J)
     A = J @ np.swapaxes(J, 1, 2)
     damping = mu * _square(e) + _ROUNDING * np.trace(A, axis1=1, axis2=2) + np.finfo(float).tiny
     A = A + damping[:, None, None] * np.eye(A.shape[-1])

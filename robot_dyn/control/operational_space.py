@@ -155,13 +155,13 @@ class OperationalSpace(Stateless):
     frame: str
     reference: CartesianReference
     _: KW_ONLY
-    kp: CoefficientField = field(metadata=coefficient("1/s²", shapes=((), ("m",)), least=0))
-    kd: CoefficientField = field(metadata=coefficient("1/s", shapes=((), ("m",)), least=0))
+    kp: CoefficientField = field(metadata=coefficient("1/s²", shapes=((), ("m",)), minimum=0))
+    kd: CoefficientField = field(metadata=coefficient("1/s", shapes=((), ("m",)), minimum=0))
     posture: OptionalCoefficientField = field(default=default(None), metadata=coefficient("rad", shapes=(("n",),)))
-    posture_kp: CoefficientField = field(default=default(0.0), metadata=coefficient("1/s²", least=0))
-    posture_kd: CoefficientField = field(default=default(0.0), metadata=coefficient("1/s", least=0))
+    posture_kp: CoefficientField = field(default=default(0.0), metadata=coefficient("1/s²", minimum=0))
+    posture_kd: CoefficientField = field(default=default(0.0), metadata=coefficient("1/s", minimum=0))
     rows: Any = None
-    threshold: float = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), above=0))
+    threshold: float = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), exclusive_minimum=0))
     period_s: float = 0.0
 
     term = "Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture"

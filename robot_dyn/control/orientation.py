@@ -62,7 +62,7 @@ def _quaternion(R: Array) -> tuple[Array, Array]:
     The row of the largest of its four parts is normalised, which keeps all digits.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = ([R[..., i, j : j + 1] for j in range(3)] for i in range(3))
-    rows = (  # of 4 (w, x)(w, x)ᵀ
+    rows = (  # rows of 4 (w, x)(w, x)ᵀ
         (1 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
         (zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx),
         (xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.control.levenberg_marquardt import Descent, descend, held
+from robot_dyn.control.levenberg_marquardt import Descent, at_bound, descend
 from robot_dyn.control.orientation import rotation_vector
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.arithmetic import transpose
@@ -196,7 +196,7 @@ def _best(
     order = good[np.argsort(np.abs(q[good] - start).max(axis=1), kind="stable")]
     best = order[0] if len(order) else int((descent.e**2).sum(axis=1).argmin())
     J = descent.J[best]
-    held_by = () if len(order) else _limits(arm, q[best], held(q[best], descent.e[best], J, arm.lower, arm.upper))
+    held_by = () if len(order) else _limits(arm, q[best], at_bound(q[best], descent.e[best], J, arm.lower, arm.upper))
     return InverseKinematics(
         *(arm.name, arm.joint_names, arm.joint_types, frame, q[best], float(length[best]), float(angle[best])),
         *(bool(len(order)), held_by, _distinct(q[order]), len(q), int(good[0]) + 1 if len(good) else 0),

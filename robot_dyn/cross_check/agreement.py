@@ -43,7 +43,7 @@ class Agreement:
         return bool(self.error <= self.tolerance)
 
     @property
-    def share(self) -> float:
+    def tolerance_fraction(self) -> float:
         """Error as a fraction of the tolerance."""
         return self.error / self.tolerance
 
@@ -80,7 +80,7 @@ class Comparison(Answer):
     @property
     def worst(self) -> Agreement:
         """Agreement with the largest error as a fraction of its tolerance."""
-        return max(self.agreements, key=lambda agreement: agreement.share)
+        return max(self.agreements, key=lambda agreement: agreement.tolerance_fraction)
 
     def blocks(self) -> Iterator[Block]:
         agreed = f"{sum(x.ok for x in self.agreements)} of {len(self.agreements)} quantities agree"
@@ -97,7 +97,7 @@ class Comparison(Answer):
     def drawing(self) -> str:
         from robot_dyn.foundations.display import levels
 
-        shares = {agreement.quantity: agreement.share for agreement in self.agreements}
+        shares = {agreement.quantity: agreement.tolerance_fraction for agreement in self.agreements}
         return levels("worst error / allowed; exact agreement is left out", shares, 1.0)
 
 
@@ -146,6 +146,6 @@ def worst_by_quantity(agreements: Iterable[Agreement]) -> tuple[Agreement, ...]:
     worst: dict[str, Agreement] = {}
     for agreement in agreements:
         current = worst.get(agreement.quantity)
-        if current is None or agreement.share > current.share:
+        if current is None or agreement.tolerance_fraction > current.tolerance_fraction:
             worst[agreement.quantity] = agreement
     return tuple(worst.values())

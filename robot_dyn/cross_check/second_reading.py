@@ -59,7 +59,7 @@ def _by_yourdfpy(text: bytes) -> Any:
 
     root = etree.fromstring(text)  # raises where yourdfpy would use the recovered part
     if None in root.nsmap:
-        raise ValueError("it takes no element of a default namespace")
+        raise ValueError("it does not read elements of a default namespace")
     return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot
 
 

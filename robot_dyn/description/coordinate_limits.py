@@ -16,7 +16,7 @@ from robot_dyn.description.structure import StatedJoint, Structure
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.arithmetic import FLOAT64
 
-# Below this part of the joint's own range, the limits of a follower are taken as not meant for it: the knuckles of many
+# Below this part of the joint's own range, the limits of a follower are ignored: the knuckles of many
 # grippers all state the range of one of them.
 _LEAST_PART = 0.1
 _ROUNDING = 1e-9  # fraction of the range: limits this close are the same, because files state few digits

@@ -90,7 +90,7 @@ class Couplings(Value):
         if self._rounded.size and full.dtype.kind == "f" and self._hidden(full):
             raise OverflowedError(
                 "q is so large that the positions of mimic joints are not exact to"
-                f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.accuracy.Ball(bits))"
+                f" {LEAST_EXACT:g} rad or m; use a smaller q, or rd.Lagrangian(robot, rd.accuracy.Ball(bits))"
             )
         return full
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _SLACK = 1e-9  # relative to the largest moment: rounding of printed digits
 _LEVER_SLACK = 1e-12  # relative to m c² and to m (1 m)²: rounding of merged bodies
-_ROTATION_SLACK = 1e-6  # of RᵀR − 1: drift of an integrated R
+_ROTATION_SLACK = 1e-6  # largest entry of RᵀR − 1: drift of an integrated R
 
 
 def rotation_matrix(R: ArrayLike) -> np.ndarray:

@@ -16,7 +16,7 @@ from robot_dyn.foundations.errors import CatalogError, shown
 
 _MAX_BYTES = 2**16  # largest size of a package.xml
 _MAX_FOLDERS = 5000  # searched below one folder
-_DEPTH = 3  # of packages below a searched folder, as in src/repository/package
+_DEPTH = 3  # largest depth of packages below a searched folder, as in src/repository/package
 _COMMENT = re.compile(rb"<!--.*?(-->|\Z)", re.DOTALL)
 _NAME = re.compile(rb"<name[^<>]*>\s*([^<\s]+)\s*</name>")
 

@@ -7,7 +7,7 @@
     loads              ExternalWrench, CarriedPayload
     to write one       Conservative, Dissipative, Active, Bound, Stateful, Drive, SetValued: base classes of Effect
                        coefficient, Threshold, Layer: declarations of an effect; Dynamics: its first argument
-    used with effects  Plant, EquationOfMotion, Force, Hold, Interval, Mode
+    used with effects  Plant, EquationOfMotion, Force, HeldJoint, Interval, Mode
 
 docs/developers/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.
 """

@@ -15,7 +15,7 @@ from robot_dyn.effects.effect import Stateful as Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion as EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
 from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
-from robot_dyn.effects.hold import Hold as Hold
+from robot_dyn.effects.hold import HeldJoint as HeldJoint
 from robot_dyn.effects.joint_limit import JointStopDamper as JointStopDamper
 from robot_dyn.effects.joint_limit import JointStopSpring as JointStopSpring
 from robot_dyn.effects.joint_limit import joint_stops as joint_stops

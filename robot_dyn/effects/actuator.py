@@ -41,7 +41,7 @@ class EffortLimit(Bound):
     """
 
     limit: CoefficientField = field(
-        metadata=coefficient("N m", symbol="u_max", least=0, infinite=True, elsewhere=inf, stated="effort_limit")
+        metadata=coefficient("N m", symbol="u_max", minimum=0, infinite=True, fill_value=inf, stated="effort_limit")
     )
 
     _middle: OptionalCoefficientField = field(
@@ -86,7 +86,7 @@ class ActuatorLag(Stateful, Bound):
         >>> rd.effects.ActuatorLag(time_constant_s=[0.02, 0.05])
     """
 
-    time_constant_s: CoefficientField = field(metadata=coefficient("s", symbol="T", above=0))
+    time_constant_s: CoefficientField = field(metadata=coefficient("s", symbol="T", exclusive_minimum=0))
 
     term = "u' = (u_command − u) / T"
     thresholds = smooth

@@ -41,10 +41,10 @@ class DahlFriction(Bristles, Dissipative):
         >>> rd.effects.DahlFriction(bristle_stiffness=300.0, coulomb=[0.7, 1.0], exponent=1.5)
     """
 
-    bristle_stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="σ", least=0))
-    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
+    bristle_stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="σ", minimum=0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", exclusive_minimum=0, fill_value=1.0))
     exponent: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient(symbol="α", least=1, elsewhere=1.0)
+        default=default(None), metadata=coefficient(symbol="α", minimum=1, fill_value=1.0)
     )
 
     term = "−σ z, z' = |w|^α sign(w) v, w = 1 − (σ z/f_c) sign(v)"

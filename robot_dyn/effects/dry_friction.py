@@ -46,10 +46,12 @@ class DryFriction(SetValued):
         >>> rd.effects.DryFriction(coulomb=[0.4, 0.2], static=0.6, stribeck_velocity=0.1)
     """
 
-    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", least=0, stated="friction"))
-    static: OptionalCoefficientField = field(default=default(None), metadata=coefficient("N m", symbol="f_s", least=0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", minimum=0, stated="friction"))
+    static: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("N m", symbol="f_s", minimum=0)
+    )
     stribeck_velocity: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0)
+        default=default(None), metadata=coefficient("rad/s", symbol="v_s", exclusive_minimum=0, fill_value=1.0)
     )
 
     held: OptionalCoefficientField = field(

@@ -49,8 +49,8 @@ class Term:
     """An edit of the robot, or an effect.
 
     Attributes:
-        kind: Its name in scenes.
-        term: Its equation in one line; empty for a user-defined effect without `term`.
+        kind: Name in scenes.
+        term: Equation in one line; empty for a user-defined effect without `term`.
         numbers: Numbers as written in a scene.
         coefficients: Coefficients as they act, with units.
     """
@@ -106,7 +106,7 @@ class Explanation(Answer):
                 yield f"    as it acts: {'; '.join(effect.coefficients)}"
         if self.absent:
             yield ""
-            yield "not simulated, because it was not named:"
+            yield "not simulated (the setup does not name them):"
             yield f"  {', '.join(self.absent)}"
         if self.absent_of_control:
             yield f"  of the control: {', '.join(self.absent_of_control)}"
@@ -114,7 +114,7 @@ class Explanation(Answer):
             yield from ("", *lines) if lines else ()
         if self.source:
             yield ""
-            yield f"the file of the robot: {abbreviated(self.source)}"
+            yield f"robot file: {abbreviated(self.source)}"
             yield from (f"  {finding}" for finding in self.findings)
 
 

@@ -27,7 +27,7 @@ class ViscousFriction(Dissipative):
         >>> rd.effects.ViscousFriction(viscous=[0.3, 0.1])
     """
 
-    viscous: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+    viscous: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", minimum=0, stated="damping"))
 
     term = "−b v"
     thresholds = smooth
@@ -51,9 +51,9 @@ class RegularisedCoulombFriction(Dissipative):
         >>> rd.effects.RegularisedCoulombFriction(coulomb=0.2, velocity_scale=[0.05, 0.1])
     """
 
-    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f", minimum=0, stated="friction"))
     velocity_scale: CoefficientField = field(
-        default=default(0.01), metadata=coefficient("rad/s", symbol="v_s", above=0)
+        default=default(0.01), metadata=coefficient("rad/s", symbol="v_s", exclusive_minimum=0)
     )
 
     term = "−f tanh(v / v_s)"

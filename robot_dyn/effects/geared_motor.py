@@ -49,11 +49,11 @@ class GearedMotor(Drive):
     def driven(self, n: int) -> Sequence[int]:
         return self._driven
 
-    def of(self, name: str, n: int) -> Array:
+    def per_joint(self, name: str, n: int) -> Array:
         """Return the values of a coefficient at the driven joints, (k,)."""
         return np.broadcast_to(getattr(self, name), (n,), subok=True)[self._driven]
 
     def reflected(self, n: int) -> Array:
         """Return the rotor inertia reflected through the gear, n² J, (k,)."""
-        J = self.of("inertia", n)
-        return J if self.ratio is None else self.of("ratio", n) ** 2 * J
+        J = self.per_joint("inertia", n)
+        return J if self.ratio is None else self.per_joint("ratio", n) ** 2 * J

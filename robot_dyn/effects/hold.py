@@ -18,7 +18,7 @@ from robot_dyn.foundations.result import reported
 
 @final
 @dataclass(frozen=True)
-class Hold:
+class HeldJoint:
     """A joint held at rest.
 
     Attributes:
@@ -41,7 +41,7 @@ class Hold:
         return max(min(self.load - self.lower_breakaway, self.upper_breakaway - self.load), 0.0)
 
 
-def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> tuple[Hold, ...]:
+def held_joints(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> tuple[HeldJoint, ...]:
     """Return the joints held at rest under a total torque; arguments are not checked.
 
     Args:
@@ -59,5 +59,7 @@ def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.nda
     for i in np.flatnonzero((v == 0) & (a == 0) & (np.less(least, 0) | np.greater(most, 0))):
         by = tuple(name for name, interval in intervals if interval.least[i] < 0 or interval.most[i] > 0)
         ends = -float(most[i]), -float(least[i])  # pyright: ignore[reportIndexIssue]
-        holds.append(Hold(equation.dynamics.joint_names[i], by, -float(reaction[i]) + 0.0, *(x + 0.0 for x in ends)))
+        holds.append(
+            HeldJoint(equation.dynamics.joint_names[i], by, -float(reaction[i]) + 0.0, *(x + 0.0 for x in ends))
+        )
     return tuple(holds)

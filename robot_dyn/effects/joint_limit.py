@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 _NOWHERE = 1e9  # position of a stop that does not exist
 _LOWER_STOP, _UPPER_STOP = ("lower stop", "left", "touched"), ("upper stop", "touched", "left")
-LOWER = coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower")
-UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper")
+LOWER = coefficient("rad", symbol="Lower stop", infinite=True, fill_value=-inf, stated="lower")
+UPPER = coefficient("rad", symbol="Upper stop", infinite=True, fill_value=inf, stated="upper")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class JointStopSpring(_JointStops, Conservative):
         >>> rd.effects.JointStopSpring(lower=[-1.0, -2.0], upper=1.0, stiffness=50.0)
     """
 
-    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0))
+    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", minimum=0))
 
     through = "stiffness"
     term = "k (δ₋ − δ₊)"
@@ -122,7 +122,7 @@ class JointStopDamper(_JointStops, Dissipative):
     """
 
     damping: CoefficientField = field(
-        metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0)
+        metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", minimum=0)
     )
 
     through = "damping"

@@ -23,9 +23,9 @@ from robot_dyn.queries.dynamics import Dynamics
 
 _POINT = coefficient("m", symbol="p, a point of the frame, in its axes", shapes=((3,),))
 _OTHER = coefficient("m", symbol="p', a point of the other frame, in its axes, or of the world", shapes=((3,),))
-_STIFFNESS = coefficient("N/m", symbol="k", shapes=((),), least=0)
-_DAMPING = coefficient("N s/m", symbol="c", shapes=((),), least=0)
-_LENGTH = coefficient("m", symbol="ℓ₀, the length without force", shapes=((),), least=0)
+_STIFFNESS = coefficient("N/m", symbol="k", shapes=((),), minimum=0)
+_DAMPING = coefficient("N s/m", symbol="c", shapes=((),), minimum=0)
+_LENGTH = coefficient("m", symbol="ℓ₀, the length without force", shapes=((),), minimum=0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,12 +70,14 @@ class LuGreFriction(Bristles, Active):
         ...     static=1.2, stribeck_velocity=0.1)
     """
 
-    bristle_stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="σ₀", least=0))
-    bristle_damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="σ₁", least=0))
-    viscous: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="σ₂", least=0))
-    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
-    static: CoefficientField = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
-    stribeck_velocity: CoefficientField = field(metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
+    bristle_stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="σ₀", minimum=0))
+    bristle_damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="σ₁", minimum=0))
+    viscous: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="σ₂", minimum=0))
+    coulomb: CoefficientField = field(metadata=coefficient("N m", symbol="f_c", exclusive_minimum=0, fill_value=1.0))
+    static: CoefficientField = field(metadata=coefficient("N m", symbol="f_s", exclusive_minimum=0, fill_value=1.0))
+    stribeck_velocity: CoefficientField = field(
+        metadata=coefficient("rad/s", symbol="v_s", exclusive_minimum=0, fill_value=1.0)
+    )
 
     name = "lugre_friction"
     term = "−(σ₀ z + σ₁ z' + σ₂ v), z' = v − σ₀ |v| z / g(v)"

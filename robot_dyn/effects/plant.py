@@ -15,7 +15,7 @@ from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Statefu
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.explanation import explanation
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.effects.hold import Hold, held
+from robot_dyn.effects.hold import HeldJoint, held_joints
 from robot_dyn.effects.missing_time import MISSING_TIME
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
@@ -52,7 +52,9 @@ class Plant(NamesNearest, Caching):
         object.__setattr__(self, "dynamics", dynamics)
         if isinstance(effects, str):
             if effects != "urdf":
-                raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for the friction in the file")
+                raise EffectError(
+                    f"effects must be a list of effects, or 'urdf' for the friction in the file, got {shown(effects)}"
+                )
             effects = stated_friction(dynamics)
         if (sequence := several(effects)) is None:
             raise EffectError(
@@ -169,7 +171,7 @@ class Plant(NamesNearest, Caching):
         rows = zip(*(np.broadcast_to(x, (*batch, n)).reshape(-1, n) for x in (q, v, total)), strict=True)
         return np.array([equation.acceleration(*row) for row in rows]).reshape(*batch, n)
 
-    def held(self, q: Array, v: Array, u: Array, *, t: float | None = None) -> tuple[Hold, ...]:
+    def held_joints(self, q: Array, v: Array, u: Array, *, t: float | None = None) -> tuple[HeldJoint, ...]:
         """Return the joints that dry friction and rigid stops hold in one state, with load and break-away loads.
 
         Args:
@@ -184,9 +186,9 @@ class Plant(NamesNearest, Caching):
         """
         q, v, u = self._states(q=q, v=v, u=u)
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
-            raise QueryError(f"held takes one state: q, v and u must have shape ({self.dynamics.n},)")
+            raise QueryError(f"held_joints takes one state: q, v and u must have shape ({self.dynamics.n},)")
         equation = self.at(t).equation_of_motion
-        return held(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t))
+        return held_joints(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t))
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:

@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.effects.effect import numbered
-from robot_dyn.effects.hold import Hold
+from robot_dyn.effects.hold import HeldJoint
 from robot_dyn.effects.missing_time import MISSING_TIME
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Answer, Block, Table
@@ -39,7 +39,7 @@ class PlantState(Answer, Value):
         M, C: Mass matrix and Coriolis matrix, (n, n).
         N: Gravity minus the torques of effects, (n,), in [N m] or [N].
         effects: Torque of each effect on the joints, (n,), by name.
-        held: The joints that dry friction and rigid stops hold; () if tau follows from a.
+        held_joints: The joints that dry friction and rigid stops hold; () if tau follows from a.
         plant: The plant, with the payloads it carries at that time.
         of_tau: True if a follows from tau, False if tau follows from a.
     """
@@ -58,7 +58,7 @@ class PlantState(Answer, Value):
     C: np.ndarray
     N: np.ndarray
     effects: dict[str, np.ndarray]
-    held: tuple[Hold, ...]
+    held_joints: tuple[HeldJoint, ...]
     plant: Plant = field(metadata=UNREPORTED)
     of_tau: bool = field(metadata=UNREPORTED)
 
@@ -86,15 +86,17 @@ class PlantState(Answer, Value):
         if self.remarks:
             yield ""
             yield from self.remarks
-        if self.held:
+        if self.held_joints:
             yield ""
             yield f"held at rest [{force}]:"
             headings = ("joint", "from", "load", "slides below", "slides above", "margin")
             loads = (
                 without_rounding((hold.load, hold.lower_breakaway, hold.upper_breakaway, hold.margin))
-                for hold in self.held
+                for hold in self.held_joints
             )
-            rows = tuple((hold.joint, ", ".join(hold.by), *load) for hold, load in zip(self.held, loads, strict=True))
+            rows = tuple(
+                (hold.joint, ", ".join(hold.by), *load) for hold, load in zip(self.held_joints, loads, strict=True)
+            )
             yield Table(headings, rows)
 
 
@@ -118,11 +120,11 @@ def plant_state(
     if (a is None) == (tau is None):
         raise QueryError("give one of a and tau: the other follows from it")
     q, v = (one_state(name, x, robot.joint_names) for name, x in (("q", q), ("v", v)))
-    held: tuple[Hold, ...] = ()
+    held_joints: tuple[HeldJoint, ...] = ()
     of_tau = tau is not None
     if of_tau:
         tau = plant.actuation(one_state("tau", tau, robot.joint_names))
-        a, held = plant.forward_dynamics(q, v, tau, t=t), plant.held(q, v, tau, t=t)
+        a, held_joints = plant.forward_dynamics(q, v, tau, t=t), plant.held_joints(q, v, tau, t=t)
     else:
         a = one_state("a", a, robot.joint_names)
         tau = plant.inverse_dynamics(q, v, a, t=t)
@@ -137,5 +139,5 @@ def plant_state(
     )
     return PlantState(
         robot.name, robot.edits.gravity, robot.gravity_acts, remarks, robot.joint_names, robot.joint_types,
-        **state, **terms, effects=effects, held=held, plant=plant, of_tau=of_tau,
+        **state, **terms, effects=effects, held_joints=held_joints, plant=plant, of_tau=of_tau,
     )  # fmt: skip

@@ -51,14 +51,14 @@ class RigidBacklash(GearedMotor, SetValued):
         >>> rd.effects.RigidBacklash(half_gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
     """
 
-    half_gap: CoefficientField = field(metadata=coefficient("rad", symbol="β", least=0))
-    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    half_gap: CoefficientField = field(metadata=coefficient("rad", symbol="β", minimum=0))
+    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", exclusive_minimum=0, fill_value=1.0))
     ratio: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient(symbol="n", above=0, elsewhere=1.0)
+        default=default(None), metadata=coefficient(symbol="n", exclusive_minimum=0, fill_value=1.0)
     )
-    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", least=0))
+    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", minimum=0))
     viscous: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("N m s/rad", symbol="b", least=0)
+        default=default(None), metadata=coefficient("N m s/rad", symbol="b", minimum=0)
     )
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
@@ -97,11 +97,11 @@ class RigidBacklash(GearedMotor, SetValued):
 
     def drag(self, n: int, z: Array) -> Array:
         """Return the friction b θ̇ of the motors, (k,)."""
-        return 0 * self.speeds(z) if self.viscous is None else self.of("viscous", n) * self.speeds(z)
+        return 0 * self.speeds(z) if self.viscous is None else self.per_joint("viscous", n) * self.speeds(z)
 
     def _touching(self, n: int) -> Array:
         """Return 1 for driven joints whose motor rests at an end of the gap, else 0, (k,)."""
-        return np.zeros(len(self._driven)) if self._contact is None else self.of("_contact", n) ** 2
+        return np.zeros(len(self._driven)) if self._contact is None else self.per_joint("_contact", n) ** 2
 
     def reaching(self, u: Array) -> Array:
         return self._touching(u.shape[-1]) * u[..., self._driven]

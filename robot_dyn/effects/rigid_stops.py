@@ -44,7 +44,7 @@ class RigidStops(SetValued):
 
     lower: CoefficientField = field(metadata=LOWER)
     upper: CoefficientField = field(metadata=UPPER)
-    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", least=0))
+    restitution: CoefficientField = field(default=default(0.0), metadata=coefficient(symbol="e", minimum=0))
 
     held: OptionalCoefficientField = field(
         default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)

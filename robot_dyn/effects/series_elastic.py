@@ -58,18 +58,20 @@ class SeriesElastic(GearedMotor, Dissipative):
         ...     half_gap=0.01)
     """
 
-    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0))
-    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", minimum=0))
+    inertia: CoefficientField = field(metadata=coefficient("kg m²", symbol="J", exclusive_minimum=0, fill_value=1.0))
     ratio: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient(symbol="n", above=0, elsewhere=1.0)
+        default=default(None), metadata=coefficient(symbol="n", exclusive_minimum=0, fill_value=1.0)
     )
     damping: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("N m s/rad", symbol="d", least=0)
+        default=default(None), metadata=coefficient("N m s/rad", symbol="d", minimum=0)
     )
     viscous: OptionalCoefficientField = field(
-        default=default(None), metadata=coefficient("N m s/rad", symbol="b", least=0)
+        default=default(None), metadata=coefficient("N m s/rad", symbol="b", minimum=0)
     )
-    half_gap: OptionalCoefficientField = field(default=default(None), metadata=coefficient("rad", symbol="β", least=0))
+    half_gap: OptionalCoefficientField = field(
+        default=default(None), metadata=coefficient("rad", symbol="β", minimum=0)
+    )
 
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
     _side: OptionalCoefficientField = field(
@@ -82,7 +84,7 @@ class SeriesElastic(GearedMotor, Dissipative):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         if self.half_gap is None:
             return ()
-        gaps = self.of("half_gap", n)
+        gaps = self.per_joint("half_gap", n)
         return tuple(
             Threshold(i, way * float(gaps[k]), *words, state=k)
             for way, words in ((1, _FORWARD), (-1, _BACKWARD))
@@ -113,7 +115,7 @@ class SeriesElastic(GearedMotor, Dissipative):
         n, speed = dynamics.n, self.speeds(z)
         load = self._torque(n, v, z)
         if self.viscous is not None:
-            load = load + self.of("viscous", n) * speed
+            load = load + self.per_joint("viscous", n) * speed
         return np.concatenate([speed - v[self._driven], (u[self._driven] - load) / self.reflected(n)])
 
     def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
@@ -124,7 +126,7 @@ class SeriesElastic(GearedMotor, Dissipative):
         return torque
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        n, k = dynamics.n, self.of("stiffness", dynamics.n)
+        n, k = dynamics.n, self.per_joint("stiffness", dynamics.n)
         return (self.reflected(n) * self.speeds(z) ** 2 / 2 + k * self._stretch(n, z) ** 2 / 2).sum(axis=-1)
 
     def _stretch(self, n: int, z: Array) -> Array:
@@ -132,14 +134,14 @@ class SeriesElastic(GearedMotor, Dissipative):
         deflection = z[..., : len(self._driven)]
         if self.half_gap is None:
             return deflection
-        gap = self.of("half_gap", n)
+        gap = self.per_joint("half_gap", n)
         if self._side is None:
             return positive_part(deflection - gap) - positive_part(-gap - deflection)
-        side = self.of("_side", n)
+        side = self.per_joint("_side", n)
         return side**2 * deflection - side * gap
 
     def _torque(self, n: int, v: Array, z: Array) -> Array:
-        torque = self.of("stiffness", n) * self._stretch(n, z)
+        torque = self.per_joint("stiffness", n) * self._stretch(n, z)
         if self.damping is None:
             return torque
-        return torque + self.of("damping", n) * (z[..., len(self._driven) :] - v[..., self._driven])
+        return torque + self.per_joint("damping", n) * (z[..., len(self._driven) :] - v[..., self._driven])

@@ -29,7 +29,9 @@ class Spring(Conservative):
         >>> rd.effects.Spring(stiffness=2.0, rest=[0.1, -0.2])
     """
 
-    stiffness: CoefficientField = field(metadata=coefficient("N m/rad", symbol="k", least=0, stated="stated_stiffness"))
+    stiffness: CoefficientField = field(
+        metadata=coefficient("N m/rad", symbol="k", minimum=0, stated="stated_stiffness")
+    )
     rest: CoefficientField = field(default=default(0.0), metadata=coefficient("rad", symbol="q₀", stated="stated_rest"))
 
     term = "−k (q − q₀)"

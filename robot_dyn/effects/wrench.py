@@ -48,7 +48,7 @@ class ExternalWrench(Timed, Active):
     def __post_init__(self) -> None:
         instance("frame", self.frame, str, "give the name of a link", error=EffectError)
         super().__post_init__()
-        object.__setattr__(self, "expressed_in", Axes.of(self.expressed_in))
+        object.__setattr__(self, "expressed_in", Axes.from_name(self.expressed_in))
 
     def on(self, dynamics: Dynamics) -> ExternalWrench:
         check_frame(self, dynamics, self.frame)

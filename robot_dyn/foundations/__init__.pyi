@@ -28,6 +28,7 @@ from robot_dyn.foundations.errors import ControlError as ControlError
 from robot_dyn.foundations.errors import DescriptionError as DescriptionError
 from robot_dyn.foundations.errors import EditError as EditError
 from robot_dyn.foundations.errors import EffectError as EffectError
+from robot_dyn.foundations.errors import ExportError as ExportError
 from robot_dyn.foundations.errors import MachineCodeError as MachineCodeError
 from robot_dyn.foundations.errors import MissingExtraError as MissingExtraError
 from robot_dyn.foundations.errors import MissingTimeError as MissingTimeError
@@ -93,6 +94,7 @@ from robot_dyn.foundations.validate import numbers as numbers
 from robot_dyn.foundations.validate import one_state as one_state
 from robot_dyn.foundations.validate import shaped as shaped
 from robot_dyn.foundations.validate import truth as truth
+from robot_dyn.foundations.values import OnFirstUse as OnFirstUse
 from robot_dyn.foundations.values import Value as Value
 from robot_dyn.foundations.values import read_only as read_only
 from robot_dyn.foundations.values import several as several

@@ -17,11 +17,11 @@ class Table:
     """A table of texts and numbers.
 
     Attributes:
-        heading: Of the columns.
+        heading: Headings of the columns.
         rows: Cells, texts or numbers.
-        digits: Of numbers.
-        right: Headings of columns whose texts stand at the right, as numbers do.
-        wrap: Whether a narrow terminal breaks its texts between words before it splits the table.
+        digits: Significant digits of numbers.
+        right: Headings of columns whose texts are right-aligned, like numbers.
+        wrap: True if a narrow terminal breaks texts between words before it splits the table.
     """
 
     heading: tuple[str, ...]
@@ -31,7 +31,7 @@ class Table:
     wrap: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("heading", "right"):  # of files, too: a terminal would execute their control characters
+        for name in ("heading", "right"):  # names may come from files; a terminal would execute control characters
             object.__setattr__(self, name, tuple(map(escaped, getattr(self, name))))
 
     @property
@@ -50,12 +50,12 @@ class Table:
 
     @property
     def widths(self) -> list[int]:
-        """Letters of the longest cell of each column, headings included."""
+        """Width of each column, in letters: its longest cell or heading."""
         return [max(map(len, column)) for column in zip(self.heading, *self.cells, strict=True)]
 
     @property
     def least_widths(self) -> list[int]:
-        """Letters that each column needs: of its longest cell, or of its longest word where texts may be broken."""
+        """Smallest width of each column, in letters: its longest cell, or its longest word if texts may be wrapped."""
         columns = zip(self.heading, self.widths, zip(self.heading, *self.cells, strict=True), strict=True)
         return [
             max(len(word) for cell in column for word in cell.split() or [""])
@@ -66,7 +66,7 @@ class Table:
 
     @property
     def keys(self) -> int:
-        """Number of columns at the left that identify a row: those of texts until no two rows are equal, or 1."""
+        """Number of leading columns that identify a row: text columns until no two rows are equal, at least 1."""
         cells = self.cells
         texts = [name in self.words for name in self.heading]
         for k in range(1, len(texts)):
@@ -167,7 +167,7 @@ def html_of(blocks: Iterable[Block]) -> Iterator[str]:
 
 
 def table(heading: Iterable[str], rows: Iterable[Iterable[str | float]], right: Iterable[str] = ()) -> str:
-    """Return a table as HTML, with the cells that its text has."""
+    """Return a table as HTML, with the same cells as its text."""
     return "".join(html_of([Table(tuple(heading), tuple(map(tuple, rows)), right=tuple(right))]))
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from flint import arb
     from numpy.typing import DTypeLike
 
-Array = np.ndarray  # of floats, or of flint.arb objects: NumPy has one type for both
+Array = np.ndarray  # array of floats or flint.arb objects; NumPy has one type for both
 Numeral = str | SupportsFloat  # a number in the text of a file, or a number
 Scalar = float | np.ndarray  # one number, or one for each state of a batch
 Arguments = ParamSpec("Arguments")
@@ -152,7 +152,7 @@ def arithmetic_of(dtype: DTypeLike | Arithmetic) -> Arithmetic:
     except Exception:  # any error in the conversion of a foreign object
         numpy_dtype = None
     if dtype is None or numpy_dtype is None or numpy_dtype.kind != "f" or numpy_dtype.itemsize < 4:
-        raise QueryError(f"no arithmetic {shown(dtype)}: give float32, float64, np.longdouble or Ball(bits)")
+        raise QueryError(f"dtype {shown(dtype)} is not supported: use float32, float64, np.longdouble or Ball(bits)")
     return Float(numpy_dtype)
 
 

@@ -1,6 +1,6 @@
 """Declared coefficients: the parameters of an effect, controller or reference, each with unit, sign and meaning.
 
-    damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+    damping: CoefficientField = field(metadata=coefficient("N m s/rad", symbol="b", minimum=0, stated="damping"))
 
 The declaration determines how values are checked, whether values by joint name or "urdf" are accepted, and the name in
 scenes and sweeps. It also makes the coefficient an input of machine code.
@@ -79,9 +79,9 @@ class Coefficient:
         unit: Unit for a revolute joint, such as "N m s/rad"; "" if dimensionless.
         symbol: Symbol in the equation, such as "b".
         shapes: Allowed shapes; a string stands for any length.
-        least, above: Inclusive and exclusive lower bound; None for no bound.
+        minimum, exclusive_minimum: Inclusive and exclusive lower bound; None for no bound.
         infinite: True if ±inf is allowed.
-        elsewhere: Value for joints that are not named.
+        fill_value: Value for joints that are not named.
         stated: The attribute of a `Robot` that "urdf" refers to; "" if files do not state this coefficient.
         can_vary: True if it may vary from run to run in `rollouts`.
     """
@@ -89,10 +89,10 @@ class Coefficient:
     unit: str = ""
     symbol: str = ""
     shapes: tuple[tuple[int | str, ...], ...] = JOINTS
-    least: float | None = None
-    above: float | None = None
+    minimum: float | None = None
+    exclusive_minimum: float | None = None
     infinite: bool = False
-    elsewhere: float = 0.0
+    fill_value: float = 0.0
     stated: str = ""
     can_vary: bool = True
 
@@ -101,10 +101,10 @@ class Coefficient:
             instance(name, getattr(self, name), str, "give a text, such as 'N m'", error=EffectError)
         for name in ("infinite", "can_vary"):
             truth(name, getattr(self, name), error=EffectError)
-        for name in ("least", "above"):
+        for name in ("minimum", "exclusive_minimum"):
             if getattr(self, name) is not None:
                 number(name, getattr(self, name), error=EffectError)
-        number("elsewhere", self.elsewhere, error=EffectError, infinite=True)
+        number("fill_value", self.fill_value, error=EffectError, infinite=True)
         shapes = self.shapes
         if not isinstance(shapes, tuple) or not all(isinstance(x, tuple) for x in shapes) or not shapes:
             raise EffectError(f"shapes must be tuples, such as ((), ('n',)), got {shown(shapes)}")
@@ -135,7 +135,13 @@ class Coefficient:
         if allow_unresolved and self.stated and isinstance(values, str):
             raise error(f'{name} must be real numbers or "{URDF}", got {shorten(values)!r}')
         array = numbers(
-            name, values, *self.shapes, error=error, least=self.least, above=self.above, infinite=self.infinite
+            name,
+            values,
+            *self.shapes,
+            error=error,
+            least=self.minimum,
+            above=self.exclusive_minimum,
+            infinite=self.infinite,
         )
         return float(array) if self.shapes == ((),) else array
 
@@ -149,7 +155,7 @@ class Coefficient:
         if isinstance(values, Mapping):
             for joint in values.keys() - set(names):
                 raise EffectError(f"{name}: no joint {joint!r}; {nearest(str(joint), names)}")
-            return [values.get(joint, self.elsewhere) for joint in names]
+            return [values.get(joint, self.fill_value) for joint in names]
         if values is URDF or values is URDF_SOFT:
             return self._stated(name, values, dynamics)
         if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):
@@ -166,7 +172,7 @@ class Coefficient:
             stated = getattr(dynamics, f"soft_{self.stated}" if values is URDF_SOFT else self.stated)
         except AttributeError:
             raise EffectError(f"{name}={values!r} needs a Robot, got {type(dynamics).__name__}") from None
-        if np.all(stated == self.elsewhere):
+        if np.all(stated == self.fill_value):
             raise EffectError(
                 f"{name}={values!r} has no effect: the file of {dynamics.name} states no value for any joint; give"
                 " numbers, or remove the effect"
@@ -179,16 +185,16 @@ def coefficient(
     *,
     symbol: str = "",
     shapes: tuple[tuple[int | str, ...], ...] = JOINTS,
-    least: float | None = None,
-    above: float | None = None,
+    minimum: float | None = None,
+    exclusive_minimum: float | None = None,
     infinite: bool = False,
-    elsewhere: float = 0.0,
+    fill_value: float = 0.0,
     stated: str = "",
     can_vary: bool = True,
 ) -> Mapping[str, Coefficient]:
     """Return metadata that declares a dataclass field as a coefficient; for the arguments, see `Coefficient`."""
-    form = {"shapes": shapes, "least": least, "above": above, "infinite": infinite}
-    return {_KEY: Coefficient(unit, symbol, **form, elsewhere=elsewhere, stated=stated, can_vary=can_vary)}
+    form = {"shapes": shapes, "minimum": minimum, "exclusive_minimum": exclusive_minimum, "infinite": infinite}
+    return {_KEY: Coefficient(unit, symbol, **form, fill_value=fill_value, stated=stated, can_vary=can_vary)}
 
 
 @cache

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 INK = "#010203"  # stands in figures for the colour of text on the page
 GRID = "#80808055"
 MOST_JOINTS = 8  # largest number of joints whose curves are drawn
-MOST_POINTS = 200  # of a curve: longer ones keep the minimum and maximum of each of 100 parts
+MOST_POINTS = 200  # per curve: longer ones keep the minimum and maximum of each of 100 parts
 _COLOURS = ("#4c8bf5", "#e8710a", "#1e9e55", "#d93a8f", "#9a6af0", "#b58900", "#00a3b4", "#8d6e63")
 _WIDE, _HIGH, _BAR = 3.9, 1.6, 0.2  # sizes of a plot, and height of a bar, in [inch]; two plots stand side by side
 _LONGEST = 32  # largest number of characters in the name of a row

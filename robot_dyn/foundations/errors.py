@@ -67,7 +67,7 @@ class PlanError(RobotDynError):
 
 
 class VideoError(RobotDynError):
-    """A video that cannot be made: the page has no run, the video is too long, or there is no browser."""
+    """A video that cannot be rendered: the page has no run, the video is too long, or there is no browser."""
 
 
 class TraceError(RobotDynError):
@@ -80,6 +80,10 @@ class MachineCodeError(RobotDynError, ArithmeticError):
 
 class ControlError(RobotDynError):
     """A controller or reference with invalid values or shapes."""
+
+
+class ExportError(RobotDynError):
+    """Equations that cannot be exported as C or a CasADi Function: an effect switches, or a file is in the way."""
 
 
 class ProofError(RobotDynError):

@@ -71,10 +71,12 @@ def target(
         kind = next((kind for kind in kinds if kind.suffix == path.suffix.lower()), None)
         if kind is None:
             suffixes = ", ".join(kind.suffix for kind in kinds)
-            raise error(f"{path}: {path.suffix!r} is not the suffix of {kinds[0].name}; end the name with {suffixes}")
+            raise error(f"{path}: {path.suffix!r} is not a suffix for {kinds[0].name}; use {suffixes}")
         _check(path, Path(os.path.realpath(path)), kind, error, inputs)
         if path.exists() and not force:
-            raise error(f"{path}: exists; add --force to replace it (in Python force=True), or give another path")
+            raise error(
+                f"{path}: already exists; add --force to replace it (in Python force=True), or give another path"
+            )
     except (OSError, TypeError, ValueError) as cause:  # ValueError: a NUL in the path
         raise error(f"{path}: cannot be written ({why(cause)}); give another path") from None
     return path

@@ -17,13 +17,23 @@ Parts = tuple[Part, ...]
 
 def sentence(parts: Parts, facts: Facts) -> str:
     """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
-    chosen = (next((text for text in _texts(part) if _fields(text) <= facts.keys()), "") for part in parts)
-    return "".join(text.format_map(facts) for text in chosen)
+    return "".join(text.format_map(facts) for text in _chosen(parts, facts))
+
+
+def stated(parts: Parts, facts: Facts) -> dict[str, float | str]:
+    """Return the facts that the sentence contains."""
+    names = {name for text in _chosen(parts, facts) for name in _fields(text)}
+    return {name: value for name, value in facts.items() if name in names}
 
 
 def prefixed(prefix: str, part: Part) -> Part:
     """Return a part with a prefix before each of its format strings."""
     return tuple(prefix + text for text in _texts(part))
+
+
+def _chosen(parts: Parts, facts: Facts) -> list[str]:
+    """Return the format string of each part whose facts are known."""
+    return [next((text for text in _texts(part) if _fields(text) <= facts.keys()), "") for part in parts]
 
 
 def _texts(part: Part) -> tuple[str, ...]:

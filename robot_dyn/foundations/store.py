@@ -123,7 +123,7 @@ class StoredFormat(Generic[Stored]):
 
     Attributes:
         name: Name or number of the format; it changes with the form of the files.
-        of: Type of the values, a dataclass whose arrays have a `Layout`.
+        value_type: Type of the values, a dataclass whose arrays have a `Layout`.
         kind: Kind of the files.
         error: Type of the errors.
         remedy: Remedy in messages about files that cannot be read.
@@ -132,7 +132,7 @@ class StoredFormat(Generic[Stored]):
     """
 
     name: int | str
-    of: type[Stored]
+    value_type: type[Stored]
     kind: FileKind
     error: type[RobotDynError]
     remedy: str
@@ -144,7 +144,7 @@ class StoredFormat(Generic[Stored]):
         from pydantic import ConfigDict, TypeAdapter
 
         config = ConfigDict(strict=True, extra="forbid")
-        return TypeAdapter(list[self.of], config=config)  # pyright: ignore[reportInvalidTypeForm]
+        return TypeAdapter(list[self.value_type], config=config)  # pyright: ignore[reportInvalidTypeForm]
 
     def save(self, value: Stored, path: str | Path) -> Path:
         """Write a value, completely or not at all, after the checks of a reader.

@@ -96,7 +96,7 @@ def float64(values: object) -> np.ndarray:
 
 
 def numbers(
-    what: str,
+    label: str,
     values: object,
     *shapes: Shape,
     error: Kind = QueryError,
@@ -107,7 +107,7 @@ def numbers(
     """Return finite numbers of one of the shapes as a read-only copy.
 
     Args:
-        what: Name of the argument in messages.
+        label: Name of the argument in messages.
         values: The argument.
         *shapes: Allowed shapes.
         error: Type of the error.
@@ -121,16 +121,16 @@ def numbers(
         array = np.array(float64(values))
     except ValueError as fault:
         kind = f"real numbers{', one or' if one else ''} of shape {lengths}" if lengths else "a real number"
-        raise error(f"{what} must be {kind}, got {fault}") from None
+        raise error(f"{label} must be {kind}, got {fault}") from None
     if not any(_fits(array.shape, shape) for shape in shapes):
         kind = ("be one number or of shape" if one else "have shape") + f" {lengths}" if lengths else "be one number"
-        raise error(f"{what} must {kind}, got {'' if lengths else 'shape '}{array.shape}")
+        raise error(f"{label} must {kind}, got {'' if lengths else 'shape '}{array.shape}")
     good = ~np.isnan(array) if infinite else np.isfinite(array)
     if not good.all():
-        raise error(f"{what} must be {'a number' if infinite else 'finite'}, got {array[~good][0]}")
+        raise error(f"{label} must be {'a number' if infinite else 'finite'}, got {array[~good][0]}")
     low = (array <= above) if above is not None else (array < (-inf if least is None else least))
     if low.any():
-        raise error(f"{what} must {_bound(above, least)}, got {shorten(array[low][0])}")
+        raise error(f"{label} must {_bound(above, least)}, got {shorten(array[low][0])}")
     array.setflags(write=False)
     return array
 
@@ -148,7 +148,7 @@ def _fits(shape: tuple[int, ...], expected: Shape) -> bool:
 
 
 def number(
-    what: str,
+    label: str,
     value: object,
     *,
     error: Kind = QueryError,
@@ -159,37 +159,37 @@ def number(
     """Return one finite number; for the arguments, see `numbers`."""
     if type(value) is float and isfinite(value) and above is least is None:
         return value
-    return float(numbers(what, value, (), error=error, above=above, least=least, infinite=infinite))
+    return float(numbers(label, value, (), error=error, above=above, least=least, infinite=infinite))
 
 
-def duration(what: str, value: object, *, zero: bool = False, error: Kind = QueryError) -> float:
+def duration(label: str, value: object, *, zero: bool = False, error: Kind = QueryError) -> float:
     """Return a time in [s], at least 1e-12 s, or 0 if `zero`."""
-    seconds = number(what, value, error=error)
+    seconds = number(label, value, error=error)
     if not (seconds >= 1e-12 or (zero and seconds == 0)):
         least = "at least 1e-12, or 0" if zero else "at least 1e-12"
-        raise error(f"{what} must be a positive number of seconds, {least}; got {seconds:g}")
+        raise error(f"{label} must be a positive number of seconds, {least}; got {seconds:g}")
     return seconds
 
 
-def times(what: str, t: object) -> np.ndarray:
+def times(label: str, t: object) -> np.ndarray:
     """Return times in [s], finite or not, of any shape, not copied; raise a QueryError for other values."""
     try:
         return float64(t)
     except ValueError as fault:
-        raise QueryError(f"{what} must be a time in seconds, got {fault}") from None
+        raise QueryError(f"{label} must be a time in seconds, got {fault}") from None
 
 
-def rows(what: str, values: object, *shape: int) -> np.ndarray:
+def rows(label: str, values: object, *shape: int) -> np.ndarray:
     """Return finite numbers of shape (..., *shape), not copied; raise a QueryError for other values."""
     try:
         array = float64(values)
     except ValueError as fault:
-        raise QueryError(f"{what} must be an array of real numbers, got {fault}") from None
+        raise QueryError(f"{label} must be an array of real numbers, got {fault}") from None
     if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
         expected = ", ".join(map(str, shape))
-        raise QueryError(f"{what} must have shape {shape} or (..., {expected}), got {array.shape}")
+        raise QueryError(f"{label} must have shape {shape} or (..., {expected}), got {array.shape}")
     if not np.isfinite(array).all():
-        raise QueryError(f"{what} must be finite, got {array[~np.isfinite(array)].flat[0]}")
+        raise QueryError(f"{label} must be finite, got {array[~np.isfinite(array)].flat[0]}")
     return array
 
 
@@ -209,19 +209,19 @@ def is_plain(x: object, shape: tuple[int] | None) -> TypeGuard[np.ndarray]:
 
 
 def joint_values(
-    what: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+    label: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> np.ndarray:
     """Return finite numbers of each joint, shape (..., n), not copied; for errors, see `shaped` and `converted`."""
-    return converted(what, shaped(what, values, joint_names, arithmetic), joint_names, arithmetic)
+    return converted(label, shaped(label, values, joint_names, arithmetic), joint_names, arithmetic)
 
 
 def shaped(
-    what: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+    label: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> np.ndarray:
     """Return numbers of each joint, finite or not, shape (..., n), not copied; floats and integers keep their type.
 
     Args:
-        what: Name of the argument in messages.
+        label: Name of the argument in messages.
         values: The argument: an array, or numbers by joint name, of shape (…); joints left out have 0.
         joint_names: Names of the n joints.
         arithmetic: An `Arithmetic`; float64 by default.
@@ -233,53 +233,54 @@ def shaped(
     try:
         array = real(values) if arithmetic is None or arithmetic.dtype.kind == "f" else arithmetic.asarray(values)
     except (TypeError, ValueError, OverflowError) as fault:
-        if (array := in_order(what, values, joint_names)) is not values:
-            return shaped(what, array, joint_names, arithmetic)
-        raise QueryError(f"{what} must be an array of {n} real numbers, got {fault}") from None
+        if (array := in_order(label, values, joint_names)) is not values:
+            return shaped(label, array, joint_names, arithmetic)
+        raise QueryError(f"{label} must be an array of {n} real numbers, got {fault}") from None
     if array.ndim == 0 or array.shape[-1] != n:
-        raise QueryError(f"{what} must have shape ({n},) or (..., {n}), got {array.shape}")
+        raise QueryError(f"{label} must have shape ({n},) or (..., {n}), got {array.shape}")
     return array
 
 
 def in_order(
-    what: str, values: object, joint_names: Sequence[str] | None, *, elsewhere: float = 0.0, error: Kind = QueryError
+    label: str, values: object, joint_names: Sequence[str] | None, *, fill_value: float = 0.0, error: Kind = QueryError
 ) -> Any:
     """Return numbers by joint name, or a list of such rows, as an array, (..., n); other values as they are.
 
     Args:
-        what: Name of the argument in messages.
+        label: Name of the argument in messages.
         values: The argument.
         joint_names: Names of the n joints, in the order of q; None if the caller was given none.
-        elsewhere: Number of joints left out.
+        fill_value: Number of joints left out.
         error: Type of the error.
     """
     if isinstance(values, list | tuple) and values and all(isinstance(row, Mapping) for row in values):
         rows = [
-            in_order(f"{what}[{i}]", row, joint_names, elsewhere=elsewhere, error=error) for i, row in enumerate(values)
+            in_order(f"{label}[{i}]", row, joint_names, fill_value=fill_value, error=error)
+            for i, row in enumerate(values)
         ]
-        return np.stack(_one_shape(what, dict(enumerate(rows)), error))
+        return np.stack(_one_shape(label, dict(enumerate(rows)), error))
     if not isinstance(values, Mapping):
         return values
     if joint_names is None:
-        raise error(f"{what}: numbers by joint have no order here; give joint_names=, such as arm.joint_names")
+        raise error(f"{label}: numbers by joint have no order here; give joint_names=, such as arm.joint_names")
     if not values:
-        raise error(f"{what}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
+        raise error(f"{label}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
     for name in values:
         if name not in joint_names:
-            raise error(f"{what}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
-    return np.stack(_one_shape(what, {name: values.get(name, elsewhere) for name in joint_names}, error), axis=-1)
+            raise error(f"{label}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
+    return np.stack(_one_shape(label, {name: values.get(name, fill_value) for name in joint_names}, error), axis=-1)
 
 
-def _one_shape(what: str, arrays: Mapping[Any, object], error: Kind) -> list[np.ndarray]:
+def _one_shape(label: str, arrays: Mapping[Any, object], error: Kind) -> list[np.ndarray]:
     try:
         return [*np.broadcast_arrays(*map(np.asarray, arrays.values()))]
     except ValueError:
         shapes = {name: np.shape(np.asarray(x)) for name, x in arrays.items()}
-        raise error(f"{what}: numbers of all joints must have one shape, got {shapes}") from None
+        raise error(f"{label}: numbers of all joints must have one shape, got {shapes}") from None
 
 
 def converted(
-    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+    label: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> np.ndarray:
     """Convert an array of real numbers to an arithmetic, by default float64; not copied if it has that type.
 
@@ -291,40 +292,40 @@ def converted(
     numbers = array
     if array.dtype != dtype:  # numbers too large for the arithmetic become infinite
         numbers = float64(array) if arithmetic is None else arithmetic.asarray(array)
-    check_finite(what, numbers, joint_names, arithmetic)
-    if numbers is not array and what in ("q", "t"):
-        _check_rounding(what, array, numbers, joint_names)
+    check_finite(label, numbers, joint_names, arithmetic)
+    if numbers is not array and label in ("q", "t"):
+        _check_rounding(label, array, numbers, joint_names)
     return numbers
 
 
-def _check_rounding(what: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
+def _check_rounding(label: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
     """Raise an OverflowedError if numbers were rounded and the arithmetic does not resolve LEAST_EXACT there."""
     far = np.finfo(rounded.dtype).eps * np.abs(rounded) > LEAST_EXACT
     if far.any() and (lost := far & (exact.astype(np.longdouble) != rounded)).any():
         place = tuple(np.argwhere(lost)[0])
-        joint = "" if what == "t" else f" of joint {joint_names[place[-1]]!r}"
+        joint = "" if label == "t" else f" of joint {joint_names[place[-1]]!r}"
         raise OverflowedError(
-            f"{what}{joint} is so large that {rounded.dtype} does not resolve {LEAST_EXACT:g} rad, m or s, got"
+            f"{label}{joint} is so large that {rounded.dtype} does not resolve {LEAST_EXACT:g} rad, m or s, got"
             f" {exact[place]}; use a smaller value, or a dtype with more digits"
         )
 
 
 def check_finite(
-    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+    label: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> None:
     """Raise a NotFiniteError that names the joint unless all numbers of an argument, (..., n), are finite."""
     finite = np.isfinite(array) if arithmetic is None else arithmetic.finite(array)
     if not finite.all():
         place = tuple(np.argwhere(~finite)[0])
-        joint = "" if what == "t" else f" for joint {joint_names[place[-1]]!r}"
-        raise NotFiniteError(f"{what} must be finite, got {array[place]}{joint}")
+        joint = "" if label == "t" else f" for joint {joint_names[place[-1]]!r}"
+        raise NotFiniteError(f"{label} must be finite, got {array[place]}{joint}")
 
 
-def one_state(what: str, values: object, joint_names: Sequence[str]) -> np.ndarray:
+def one_state(label: str, values: object, joint_names: Sequence[str]) -> np.ndarray:
     """Return finite numbers of each joint, shape (n,), as a read-only copy; raise a QueryError for other values."""
-    array = np.array(joint_values(what, values, joint_names))
+    array = np.array(joint_values(label, values, joint_names))
     if array.ndim != 1:
-        raise QueryError(f"{what} must be one state of shape ({len(joint_names)},), got {array.shape}")
+        raise QueryError(f"{label} must be one state of shape ({len(joint_names)},), got {array.shape}")
     array.setflags(write=False)
     return array
 
@@ -339,7 +340,7 @@ def check_batches(**arrays: np.ndarray) -> tuple[int, ...]:
 
 
 def integer(
-    what: str, value: SupportsIndex, *, least: int = 0, most: int | None = None, error: Kind = QueryError
+    label: str, value: SupportsIndex, *, least: int = 0, most: int | None = None, error: Kind = QueryError
 ) -> int:
     """Return an integer from `least` to `most`."""
     try:
@@ -348,38 +349,38 @@ def integer(
         whole = None
     if whole is None or whole < least or (most is not None and whole > most):
         limits = f"{least} or more" if most is None else f"from {least} to {most}"
-        raise error(f"{what} must be a whole number, {limits}, got {shown(value)}")
+        raise error(f"{label} must be a whole number, {limits}, got {shown(value)}")
     return whole
 
 
-def truth(what: str, value: object, *, error: Kind = QueryError) -> bool:
+def truth(label: str, value: object, *, error: Kind = QueryError) -> bool:
     """Return a truth value."""
     if not isinstance(value, bool | np.bool_):
-        raise error(f"{what} must be True or False, got {shown(value)}")
+        raise error(f"{label} must be True or False, got {shown(value)}")
     return bool(value)
 
 
-def choice(what: str, value: object, names: Collection[str], *, error: Kind = QueryError) -> str:
+def choice(label: str, value: object, names: Collection[str], *, error: Kind = QueryError) -> str:
     """Return a name if it is one of the valid ones."""
     if not isinstance(value, str) or value not in names:
         advice = nearest(value if isinstance(value, str) else "", names)
-        raise error(f"no {what} {shown(value)}; {advice}")
+        raise error(f"no {label} {shown(value)}; {advice}")
     return value
 
 
-def function(what: str, value: Function, arguments: str, *, error: Kind = QueryError) -> Function:
+def function(label: str, value: Function, arguments: str, *, error: Kind = QueryError) -> Function:
     """Return a function or None; `arguments` lists its arguments for the message."""
     if not (value is None or callable(value)):
-        raise error(f"{what} must be a function of {arguments}, or None, got {shown(value)}")
+        raise error(f"{label} must be a function of {arguments}, or None, got {shown(value)}")
     return value
 
 
 @overload
-def instance(what: str, value: object, kind: type[Instance], remedy: str, *, error: Kind = ...) -> Instance: ...
+def instance(label: str, value: object, kind: type[Instance], remedy: str, *, error: Kind = ...) -> Instance: ...
 @overload
-def instance(what: str, value: object, kind: UnionType, remedy: str, *, error: Kind = ...) -> object: ...
-def instance(what: str, value: object, kind: type | UnionType, remedy: str, *, error: Kind = QueryError) -> object:
+def instance(label: str, value: object, kind: UnionType, remedy: str, *, error: Kind = ...) -> object: ...
+def instance(label: str, value: object, kind: type | UnionType, remedy: str, *, error: Kind = QueryError) -> object:
     """Return an object of a type; the remedy in the message describes how to get one."""
     if not isinstance(value, kind):
-        raise error(f"{what}: {remedy}, got {shown(value)}")
+        raise error(f"{label}: {remedy}, got {shown(value)}")
     return value

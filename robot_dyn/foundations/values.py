@@ -100,7 +100,7 @@ class LRUByIdentity(Generic[Item]):
                 del self._values[next(iter(self._values))]
             return entry[1]
 
-    def known(self, objects: tuple[object, ...], more: tuple[Hashable, ...]) -> Item | None:
+    def cached_value(self, objects: tuple[object, ...], more: tuple[Hashable, ...]) -> Item | None:
         """Return the value that `get` would return without computing it, or None."""
         with self._lock:
             entry = self._values.get((*map(id, objects), *more))

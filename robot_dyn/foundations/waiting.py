@@ -15,12 +15,12 @@ PATIENCE_S = 2.0  # a shorter wait is not reported
 
 
 @contextmanager
-def log_if_slow(what: str) -> Iterator[None]:
+def log_if_slow(task: str) -> Iterator[None]:
     """Log what a block does, once it has taken longer than `PATIENCE_S`."""
     if not LOG.isEnabledFor(logging.INFO):
         yield
         return
-    timer = Timer(PATIENCE_S, LOG.info, ("%s", what))
+    timer = Timer(PATIENCE_S, LOG.info, ("%s", task))
     timer.daemon = True
     timer.start()
     try:

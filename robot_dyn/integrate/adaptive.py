@@ -19,7 +19,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.validate import choice, function, instance, number, numbers, rows
 from robot_dyn.integrate import dop853
-from robot_dyn.integrate.controlled_steps import Between, Status, Steps
+from robot_dyn.integrate.controlled_steps import Status, StepInterpolant, Steps
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.rosenbrock import RODAS5P_FIXED
 from robot_dyn.integrate.step_control import ControlledStepper, initial_control
@@ -47,7 +47,7 @@ class Solution:
     evaluations: int
     status: Status
     message: str
-    _pieces: tuple[Between, ...] = field(repr=False)
+    _pieces: tuple[StepInterpolant, ...] = field(repr=False)
 
     def __post_init__(self) -> None:
         self.times.setflags(write=False)

@@ -79,7 +79,7 @@ class Steps:
 
         return counted
 
-    def __iter__(self) -> Iterator[tuple[float, Array, Between]]:
+    def __iter__(self) -> Iterator[tuple[float, Array, StepInterpolant]]:
         stepper, t, y = self._stepper, self.t, self.y[:, None].copy()
         self._control = copied(self._first_control)  # a second iteration begins with a first step, too
         failed = np.zeros(1, np.int64)
@@ -110,7 +110,7 @@ class Steps:
         else:
             self.message = f"finished at t = {self.t}"
 
-    def _step(self, t: float, x: States) -> Between | None:
+    def _step(self, t: float, x: States) -> StepInterpolant | None:
         """Advance x.y by a step from t and return its polynomial; None if the step would be too short."""
         stepper, control, end = self._stepper, self._control, self._end
         coefficients, work = stepper.coefficients, stepper.work
@@ -122,7 +122,7 @@ class Steps:
         h = control.h[0]
         stepper.accept(self._f, coefficients, work, t, h, x)
         stepper.dense(self._f, coefficients, work, t, h, x)
-        piece = Between(t, h, x.y.copy(), work.F.copy())
+        piece = StepInterpolant(t, h, x.y.copy(), work.F.copy())
         x.y[...] = x.after
         work.K[0] = work.last
         return piece
@@ -131,7 +131,7 @@ class Steps:
         where = f"{reason} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
         self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
 
-    def _take(self, piece: Between, t: float, y: Array) -> bool:
+    def _take(self, piece: StepInterpolant, t: float, y: Array) -> bool:
         """Advance to t, or to an earlier sign change of `stop`; return True if the run stops."""
         stopped = False
         if self._stop is not None:
@@ -143,7 +143,7 @@ class Steps:
         self.t, self.y = t, y.copy()
         return stopped
 
-    def _crossing(self, piece: Between, t0: float, t1: float) -> float:
+    def _crossing(self, piece: StepInterpolant, t0: float, t1: float) -> float:
         from scipy.optimize import brentq
 
         stop, root = cast(Any, self._stop), cast(Any, brentq)
@@ -154,7 +154,7 @@ class Steps:
 
 
 @final
-class Between:
+class StepInterpolant:
     """The polynomial of a step: y (m,) or (m, k) at times within it."""
 
     def __init__(self, t: float, h: float, y: Array, F: Array) -> None:

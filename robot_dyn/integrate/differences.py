@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.arithmetic import Array, Scalar
 
-INSIDE = 0.01  # of a width: a central difference of tanh is then off by 3e-5, which Newton's iteration corrects
+INSIDE = 0.01  # fraction of a width: the central difference of tanh is off by 3e-5; Newton's iteration corrects it
 _MIN_SPAN = 64  # units in the last place of an entry
 
 Rate = Callable[[Scalar, Array], Array]  # f(t, y)

@@ -245,7 +245,11 @@ class PlainMethod(Integrator):
 
     def not_found(self, t: Scalar, h: Scalar) -> IntegrationError:
         """Return the error of a step whose stages are not solved."""
-        return IntegrationError(f"{self.name}: the stages of the step {float(h)} at t = {float(t)} are not found", t)
+        return IntegrationError(
+            f"{self.name}: the stage equations of the step from t = {float(t):.9g} to {float(t + h):.9g} could"
+            " not be solved",
+            t,
+        )
 
 
 def arithmetic_like(y: Array) -> Arithmetic:

@@ -99,7 +99,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
         self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
     ) -> Array:
         if frame:
-            frame = (self._link(frame[0]), *map(Axes.of, frame[1:]))
+            frame = (self._link(frame[0]), *map(Axes.from_name, frame[1:]))
         return into(out, self._evaluated(QUANTITIES[name], FORMULAS[name], state, nan, *frame))
 
     def _link(self, frame: str) -> str:

@@ -82,7 +82,7 @@ def _placement(built: Built, frame: str) -> Call:
 
 def _jacobian(built: Built, frame: str, expressed_in: str) -> Call:
     """Return the Jacobian computed in body axes and rotated: the world-aligned one loses digits far from the base."""
-    model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
+    model, index, axes = built.model, _frame(built, frame), Axes.from_name(expressed_in)
     reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
 
     def jacobian(data: pin.Data, q: ndarray) -> ndarray:
@@ -96,7 +96,7 @@ def _jacobian(built: Built, frame: str, expressed_in: str) -> Call:
 
 
 def _jacobian_rate(built: Built, frame: str, expressed_in: str) -> Call:
-    model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
+    model, index, axes = built.model, _frame(built, frame), Axes.from_name(expressed_in)
 
     def jacobian_rate(data: pin.Data, q: ndarray, v: ndarray) -> ndarray:
         if axes is Axes.WORLD:

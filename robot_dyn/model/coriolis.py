@@ -51,12 +51,12 @@ class Coriolis:
     rounding: float
 
     @classmethod
-    def of(cls, model: pin.Model, couplings: Couplings) -> Coriolis:
+    def from_model(cls, model: pin.Model, couplings: Couplings) -> Coriolis:
         """Return the Coriolis matrix of a model with these couplings."""
         with np.errstate(all="ignore"):  # overflowing masses give a NaN bound, which fails the test below
             near_base = regrouped(model)
             bound = rounding(model, near_base, couplings)
-        return cls(Bodies.of(model), near_base if bound <= MOST_ROUNDING else None, slides(model), bound)
+        return cls(Bodies.from_model(model), near_base if bound <= MOST_ROUNDING else None, slides(model), bound)
 
     def matrix(self, data: pin.Data, q: ndarray, v: ndarray) -> ndarray:
         """Return C of the Christoffel symbols at one state, (N, N)."""
@@ -87,7 +87,7 @@ class Bodies:
     sums: ndarray
 
     @classmethod
-    def of(cls, model: pin.Model) -> Bodies:
+    def from_model(cls, model: pin.Model) -> Bodies:
         """Return the bodies of a model."""
         inertia = np.array([body.matrix() for body in model.inertias[1:]])
         of_brackets = (inertia[:, None] @ bracket(np.eye(6))).swapaxes(1, 2)

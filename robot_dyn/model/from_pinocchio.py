@@ -30,7 +30,7 @@ _KINDS = {
 }
 _FRAMES = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 _UNBOUNDED = float(UNBOUNDED)
-_UNIT_SLACK = 1e-12  # of an axis: rounding of normalisation
+_UNIT_SLACK = 1e-12  # error of a unit axis: rounding of normalisation
 
 
 def described(model: pin.Model) -> tuple[Description, Edits]:

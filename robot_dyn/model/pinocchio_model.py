@@ -46,7 +46,7 @@ class Built:
     @cached_property
     def coriolis(self) -> Coriolis:
         """Coriolis matrix of `model`, with the bound on its rounding error."""
-        return Coriolis.of(self.model, self.couplings)
+        return Coriolis.from_model(self.model, self.couplings)
 
     @cached_property
     def sizes(self) -> Mapping[str, int]:

@@ -30,7 +30,7 @@ from robot_dyn.model.pinocchio_model import scale_inertial, write_edits
 
 _URDF = FileKind("a URDF", ".urdf", b"<?xml")
 _DRAWN = ("visual", "collision")
-_UNIT_SLACK = 1e-15  # of an axis: its rounding
+_UNIT_SLACK = 1e-15  # rounding of a unit axis
 
 
 def write_urdf(description: Description, edits: Edits, path: str | Path) -> Path:

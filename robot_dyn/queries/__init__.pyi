@@ -9,6 +9,7 @@ from robot_dyn.queries.dynamics import Dynamics as Dynamics
 from robot_dyn.queries.dynamics import M as M
 from robot_dyn.queries.dynamics import N as N
 from robot_dyn.queries.quantity import Quantity as Quantity
+from robot_dyn.queries.units import coefficient_unit as coefficient_unit
 from robot_dyn.queries.units import format_duration as format_duration
 from robot_dyn.queries.units import joint_types_of as joint_types_of
 from robot_dyn.queries.units import joint_units as joint_units

@@ -21,7 +21,7 @@ from robot_dyn.foundations.errors import (
 )
 from robot_dyn.foundations.validate import check_batches, converted
 
-_REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of one state; other errors concern the query
+_REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # errors of one state; others concern the query
 
 
 class DoubtError(RobotDynError):

@@ -40,7 +40,7 @@ class Axes(StrEnum):
     WORLD = "world"
 
     @classmethod
-    def of(cls, name: object) -> Axes:
+    def from_name(cls, name: object) -> Axes:
         """Return the axes of that name; raise QueryError for any other."""
         text = name if isinstance(name, str) else str(getattr(name, "name", shown(name)))  # Pinocchio's have names
         return cls(choice("expressed_in", _OF_PINOCCHIO.get(text, text), list(cls)))
@@ -266,7 +266,7 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
         return cholesky_solve(M, tau)
     except NotPositiveDefiniteError as error:
         if M.dtype.kind == "f" and not np.isfinite(M).all():
-            raise OverflowedError("q is so large that M overflows; take a smaller q") from None
+            raise OverflowedError("q is so large that M overflows; use a smaller q") from None
         joint = joint_names[error.row]
         if error.decided:
             raise SingularError(joint, "at this q") from None

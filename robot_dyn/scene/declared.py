@@ -56,7 +56,7 @@ def _argument(name: str, value: Any, robot: Robot, form: Coefficient | None) -> 
     if form is None:
         return value
     if form.of_joints or isinstance(value, dict):
-        return per_joint(name, value, robot, elsewhere=form.elsewhere)
+        return per_joint(name, value, robot, elsewhere=form.fill_value)
     if isinstance(value, list):
         return numbers(name, value, ("k",), ("k", "m"), error=SceneError)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -92,8 +92,8 @@ def declared_part(
     for key, (name, form) in keys.items():
         default = parameters[name].default
         default = (URDF if form.stated else ...) if default is Parameter.empty else default
-        none = f"; joints left out have {'none' if isinf(form.elsewhere) else f'{form.elsewhere:g}'}"
-        none = none if form.elsewhere else ""
+        none = f"; joints left out have {'none' if isinf(form.fill_value) else f'{form.fill_value:g}'}"
+        none = none if form.fill_value else ""
         fields[key] = (_type(form), Field(default, description=f"{form.symbol}{none}."))
     text = text or (getdoc(factory) or kind).partition("\n\nAttributes:")[0]
     part = create_model(kind, __base__=base, __doc__=text, **fields)
@@ -107,7 +107,7 @@ def _type(form: Coefficient) -> Any:
         return Stated if form.stated else PerJoint
     if form.shapes == ((3,),):
         return Vector3
-    return Any if form.shapes != ((),) else Number if form.least is None else NotNegative
+    return Any if form.shapes != ((),) else Number if form.minimum is None else NotNegative
 
 
 def callable_part(base: type[Table], kind: str, factory: Callable[..., Any]) -> type[Table]:

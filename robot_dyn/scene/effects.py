@@ -141,7 +141,7 @@ class Armature(Edit):
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
         if self.inertia_kg_m2 == URDF:
-            stated = dict(loaded.edits.armature)  # of an MJCF file
+            stated = dict(loaded.edits.armature)  # stated by an MJCF file
             if not stated and not loaded.stated_armature.any():
                 raise SceneError("inertia_kg_m2: the robot's file states no armature; give it by joint")
             if "gear_ratio" in self.model_fields_set:
@@ -218,7 +218,7 @@ _LINE = declared_part(
     },
 )  # fmt: skip
 _OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, Wrench, Carried)}
-"""Tables that are not made from one class, by kind."""
+"""Tables that are not built from one class, by kind."""
 
 
 def _acting() -> Iterator[type[Acting]]:

@@ -39,24 +39,24 @@ OF_FILE = "the robot's file"
 _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 
 
-def explain(what: Setup | Plant | Dynamics | str | Path) -> Explanation:
+def explain(system: Setup | Plant | Dynamics | str | Path) -> Explanation:
     """Explain the equation of motion: its terms, the effects with their coefficients, and effects not simulated.
 
     The `repr` of the result are the lines that `robot-dyn explain` prints, `to_json()` is the document of
     `robot-dyn explain --json`. For a scene file it includes the source of each number.
 
     Args:
-        what: A setup, a plant, a robot, or the path of a scene file.
+        system: A setup, a plant, a robot, or the path of a scene file.
 
     Raises:
         SceneError: If the scene cannot be read.
         EffectError: If the argument is none of these.
     """
-    if isinstance(what, str | Path):
-        return of_scene(*read_both(what))
-    if isinstance(what, Setup):
-        return _complete(explanation_of(what), what.plant, what)
-    plant = what if isinstance(what, Plant) else Plant(what)
+    if isinstance(system, str | Path):
+        return of_scene(*read_both(system))
+    if isinstance(system, Setup):
+        return _complete(explanation_of(system), system.plant, system)
+    plant = system if isinstance(system, Plant) else Plant(system)
     return _complete(explanation(plant.dynamics, plant.effects), plant, None)
 
 

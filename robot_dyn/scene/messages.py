@@ -69,7 +69,7 @@ def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str])
 
     Args:
         paths: Paths by the words that stand for them in messages, such as "step_s" or "coulomb_friction".
-        kinds: Of the effects of the scene.
+        kinds: Kinds of the effects of the scene.
 
     Raises:
         SceneError: Instead of an error whose message names a part.

@@ -141,7 +141,7 @@ class Scene(Part):
     def _every_key_has_an_effect(self) -> Self:
         stated = self.model_fields_set
         if self.control is None and "reference" in stated:
-            raise wrong_key("reference", "nothing follows it; add a [control]")
+            raise wrong_key("reference", "has no effect without a controller; add [control]")
         chosen = [key for key in ("method", "step_s", "rtol", "atol") if key in stated]
         if self.accuracy is not None and chosen:
             raise wrong_key(
@@ -305,5 +305,5 @@ def _syntax(error: Exception) -> str:
         return "is not readable TOML: lists or tables are nested too deeply"
     message = shorten(error, 200)
     if place := re.fullmatch(r"(.*) \(at (line \d+, column \d+)\)", message):
-        return f"{place[2]}: is not TOML: {place[1]}"
-    return f"is not TOML: {message}"
+        return f"{place[2]}: is not valid TOML: {place[1]}"
+    return f"is not valid TOML: {message}"

@@ -33,7 +33,7 @@ class Part(BaseModel):
         valid = cls.valid_keys()
         for key in _table(value):
             if key not in valid and cls.model_config.get("extra") != "allow":
-                raise wrong_key(key, f"is not a key here; {nearest(key, valid)}")
+                raise wrong_key(key, f"unknown key; {nearest(key, valid)}")
         return value
 
 

@@ -29,12 +29,12 @@ class ClosedParts:
 
     Attributes:
         corners: Triangle corners of each part, (m, 3, 3), in [m], counter-clockwise seen from outside the material.
-        turned: Indices of parts whose faces, some or all, were inside out and were flipped.
+        flipped_parts: Indices of parts whose faces, some or all, were inside out and were flipped.
         overlaps: Pairs of parts that share some volume.
     """
 
     corners: tuple[ndarray, ...]
-    turned: tuple[int, ...]
+    flipped_parts: tuple[int, ...]
     overlaps: tuple[tuple[int, int], ...]
 
     def place(self, part: int) -> str:

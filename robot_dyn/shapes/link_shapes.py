@@ -28,14 +28,14 @@ class _Bodies(NamedTuple):
     Attributes:
         solid, hull, shell: See `LinkShape`.
         closed: False if the solid is a convex hull because the mesh is open.
-        turned: Number of parts whose faces were inside out and were flipped.
+        flipped_parts: Number of parts whose faces were inside out and were flipped.
     """
 
     solid: MassProperties | None
     hull: MassProperties | None
     shell: MassProperties | None
     closed: bool
-    turned: int = 0
+    flipped_parts: int = 0
 
 
 @final
@@ -97,7 +97,7 @@ class _Reader:
     """Reader of the shapes of one file, which reads each mesh once."""
 
     def __init__(self, source: Path, package_dirs: tuple[str | Path, ...], allow_overlap: bool) -> None:
-        self.remarks: list[str] = []  # of the shape that is read
+        self.remarks: list[str] = []  # remarks on the current shape
         self.file = partial(find_file, source=source, package_dirs=package_dirs, remarks=self.remarks)
         self._mesh = cache(partial(_of_mesh, allow_overlap=allow_overlap))
 
@@ -131,7 +131,7 @@ class _Reader:
         R, p = placement[:3, :3], placement[:3, 3]
         own = self.mesh(shape) if shape.tag == "mesh" else _of_primitive(shape)
         solid, hull, shell = (None if body is None else body.moved(R, p) for body in own[:3])
-        return _Bodies(solid, hull, shell, own.closed, own.turned)
+        return _Bodies(solid, hull, shell, own.closed, own.flipped_parts)
 
     def mesh(self, element: Any) -> _Bodies:
         address = element.get("filename")
@@ -151,7 +151,7 @@ def _of_mesh(path: Path, scale: tuple[float, ...], allow_overlap: bool) -> _Bodi
     shell = surface.shell(vertices, faces)
     if solid is None:
         return _Bodies(hull, hull, shell, False)
-    return _Bodies(solid.body, hull, shell, True, solid.turned)
+    return _Bodies(solid.body, hull, shell, True, solid.flipped_parts)
 
 
 def _of_primitive(shape: Any) -> _Bodies:
@@ -172,6 +172,6 @@ def _origin(kind: str, stated: list[Any], read: list[_Bodies]) -> str:
         words.append(f"closed {kind} mesh" + "es" * (closed > 1))
     if number := len(closed_meshes) - sum(closed_meshes):
         words.append(f"open {kind} mesh" + ("es, by their convex hulls" if number > 1 else ", by its convex hull"))
-    if turned := sum(bodies.turned for bodies in read):
+    if turned := sum(bodies.flipped_parts for bodies in read):
         words[-1] += f" ({turned} part{'s' * (turned > 1)} flipped: faces were inside out)"
     return " and ".join(words)

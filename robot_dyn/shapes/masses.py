@@ -81,12 +81,14 @@ class Masses:
             left = self.total - measured - sum(self.by_link.values())
             if not others:
                 raise QueryError(
-                    "total_mass: no link without a mass has a shape that could take a share; remove total_mass"
+                    "total_mass: every link without a mass also lacks a shape, so no mass can be distributed;"
+                    " remove total_mass"
                 )
             if left <= 0:
                 stated = self.total - left
                 raise QueryError(
-                    f"total_mass of {self.total:g} kg leaves nothing to share: {stated:g} kg are stated; correct it"
+                    f"total_mass of {self.total:g} kg does not exceed the {stated:g} kg that the file and mass"
+                    f" state; correct it"
                 )
             volume = sum(shape.hull.mass for shape in others.values())
             origin = f"by its share of hull volume in a total of {self.total:g} kg: {left / volume:.4g} kg/m³"

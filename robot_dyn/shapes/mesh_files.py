@@ -118,7 +118,7 @@ def check_gltf(data: bytes, resolver: FilePathResolver) -> None:
     addresses = [buffer.get("uri", "") for buffer in head.get("buffers", ())]
     available = len(data) + sum(len(resolver[uri]) for uri in addresses if uri and not uri.startswith("data:"))
     if sum(accessor["count"] for accessor in head.get("accessors", ())) > available:
-        raise MeshError("claims more vertices than it has bytes; export it again")
+        raise MeshError("declares more vertices than its size allows; export it again")
     if len(head.get("nodes", ())) > MAX_NODES:
         raise MeshError(f"has more than {MAX_NODES} nodes; simplify it")
     if unread := next(_unread(head), None):

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from PIL import Image
 
 
-MAX_PIXELS = 1024  # of a texture's longer side in the page
+MAX_PIXELS = 1024  # largest side of a texture in the page
 FORMATS = ("stl", "dae", "obj", "ply", "glb", "gltf")
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of a binary STL file
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # triangle of binary STL
 _HEADER = 84  # bytes before the records: 80 of text and the count
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _BAD_NORMAL = re.compile(rb"\bnormal\b(?!(?:\s+[-+.\deE]+|\s+[-+]?(?:nan|inf)){3}\s)", re.IGNORECASE)

@@ -37,12 +37,12 @@ class Solid:
     Attributes:
         body: Mass properties at 1 kg/m³.
         parts: Number of closed parts.
-        turned: Number of parts with faces that were inside out and were flipped.
+        flipped_parts: Number of parts with faces that were inside out and were flipped.
     """
 
     body: MassProperties
     parts: int
-    turned: int
+    flipped_parts: int
 
 
 def solid(vertices: ndarray, faces: ndarray, *, allow_overlap: bool = False) -> Solid | None:
@@ -69,7 +69,7 @@ def solid(vertices: ndarray, faces: ndarray, *, allow_overlap: bool = False) -> 
         return None
     if not allow_overlap and (outer := hull(vertices)) is not None and body.mass > _ROUNDED * outer.mass:
         raise MeshError(f"its surface overlaps itself: it encloses more than its convex hull; {REMEDY}")
-    return Solid(body, len(closed.corners), len(closed.turned))
+    return Solid(body, len(closed.corners), len(closed.flipped_parts))
 
 
 @np.errstate(all="ignore")

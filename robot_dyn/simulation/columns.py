@@ -31,22 +31,22 @@ class Column:
         quantity: Name of the quantity, for example "q".
         values: Values, one per row.
         unit: Unit; empty if there is none.
-        of: Joint, effect or number that the quantity belongs to; empty if it has one column only.
+        component: Joint, effect or number that the quantity belongs to; empty if it has one column only.
         title: The quantity in words.
-        over: Name of the axis of `of` if that is not the joints.
+        dimension: Name of the axis of `component` if that is not the joints.
     """
 
     quantity: str
     values: np.ndarray
     unit: str = ""
-    of: str = ""
+    component: str = ""
     title: str = ""
-    over: str = ""
+    dimension: str = ""
 
     @property
     def heading(self) -> str:
         """Quantity, joint and unit, for example "q elbow_joint [rad]"."""
-        return f"{self.quantity}{' ' * bool(self.of)}{self.of}" + f" [{self.unit}]" * bool(self.unit)
+        return f"{self.quantity}{' ' * bool(self.component)}{self.component}" + f" [{self.unit}]" * bool(self.unit)
 
 
 def by_heading(columns: Iterable[Column]) -> dict[str, np.ndarray]:
@@ -89,7 +89,7 @@ def data_set(
     row, coordinates, variables = columns[0].quantity, {"joint": list(joint_names)}, dict(more or {})
     for quantity, grouped in groupby(columns, lambda column: column.quantity):
         group = list(grouped)
-        of, name = tuple(column.of for column in group), re.sub(r"[\s/]", "_", quantity)
+        of, name = tuple(column.component for column in group), re.sub(r"[\s/]", "_", quantity)
         if name in variables:
             raise QueryError(f"two variables would be named {shorten(name)!r}; give effects other names")
         units = " or ".join(dict.fromkeys(column.unit for column in group if column.unit))
@@ -97,7 +97,7 @@ def data_set(
         if of == ("",):
             variables[name] = (row,), group[0].values, about
             continue
-        over = "joint" if of == joint_names else group[0].over or f"{name}_number"
+        over = "joint" if of == joint_names else group[0].dimension or f"{name}_number"
         coordinates.setdefault(over, list(of))
         variables[name] = (row, over), np.stack([column.values for column in group], axis=1), about
     coordinates |= {name: variables.pop(name) for name in (row, "t") if name in variables}

@@ -33,7 +33,7 @@ from robot_dyn.simulation.setup.setup import Setup
 @final
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The attributes of a `Trajectory` that are computed from the record of a run and values that do not change.
+    """The attributes of a `Trajectory` that are computed from the record and the setup of a run.
 
     Attributes:
         setup: The setup, with the method of the run.
@@ -42,7 +42,7 @@ class Results:
         error: Estimated error, or None.
         texts: Copy of the texts of the setup.
         compiled: True if machine code ran.
-        before: Remarks on runs that it replaced.
+        before: Remarks on earlier runs that this run replaced.
     """
 
     setup: Setup
@@ -87,7 +87,7 @@ class Results:
 
     @cached_property
     def ledger(self) -> Ledger:
-        """Energy and work; with the cause if it does not close, unless undeclared parts must not be called."""
+        """Energy and work, and why the ledger does not close, unless undeclared parts must not be called."""
         energy = ledger(self.setup.equation, self.record)
         explains = self.setup.estimate_error or not self.setup.undeclared  # the search calls them 4000 times
         if explains and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
@@ -100,7 +100,7 @@ class Results:
 
     @property
     def outcome(self) -> Outcome:
-        """Reason and time of the end; if it diverged, its step or its loop is the reason if that explains it."""
+        """Reason and time of the end. A divergence is attributed to the step or the loop where these explain it."""
         outcome = self.record.outcome
         return explained(outcome, self.setup, self._of_control) if outcome.ending is Ending.DIVERGED else outcome
 
@@ -132,7 +132,7 @@ class Results:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """Remarks on observations, on runs that it replaced, on its steps and on its control."""
+        """Remarks on observations, replaced runs, steps and control."""
         observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
         return (
             *remarks(self.setup, self.observer, observed, self.record.t, samples, self.power), *self.before,
@@ -141,7 +141,7 @@ class Results:
 
     @cached_property
     def _of_control(self) -> tuple[Remark, ...]:
-        """Remarks on the step and on the controller; one that was interrupted is not called again."""
+        """Remarks on the step and on the controller. An interrupted controller is not called again."""
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
         runs_away = self.record.outcome.ending is Ending.DIVERGED or bool(runaway(self.setup, self.observer.fastest))

@@ -18,7 +18,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
 from robot_dyn.integrate.time_stepping import MoreauJean
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
-from robot_dyn.simulation.diagnostics.runaway import judged, runaway
+from robot_dyn.simulation.diagnostics.runaway import runaway, runaway_outcome
 from robot_dyn.simulation.diagnostics.stiff_motion import replacement
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.engine.choice import choose
@@ -41,7 +41,7 @@ from robot_dyn.simulation.setup.setup import Setup, check_record
 
 @takes_options
 def simulate(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -51,8 +51,8 @@ def simulate(
     """Run a plant or a robot from a start, or a setup with other options.
 
     Args:
-        what: A plant, a robot or a setup.
-        q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        system: A plant, a robot or a setup.
+        q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `system` is a setup.
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; by default 0, or that of the setup.
         on_progress: Called with the time reached, in [s], at each step, and with the time of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
@@ -66,7 +66,7 @@ def simulate(
         AccuracyError: If the requested accuracy cannot be reached.
     """
     function("on_progress", on_progress, "the time reached")
-    setup = setup_of("simulate", what, {**starts(q0, v0), **options})
+    setup = setup_of("simulate", system, {**starts(q0, v0), **options})
     if setup.accuracy is None:
         return _simulated(setup, on_progress)
     search, run = trials(replace(setup, accuracy=None), setup.accuracy), None
@@ -124,8 +124,8 @@ class _Ran(NamedTuple):
     Attributes:
         setup: The setup, with the method of the run.
         engine: The engine of its state equation.
-        observer: Its observer.
-        recording: Its recording.
+        observer: Observer of the run.
+        recording: Recording of the run.
         run_s: Time of the run, without compiling, in [s].
         remarks: Remarks on a run that it replaces.
         runaway: The joint that reached an implausible speed, with its speed and limit; empty if there is none.
@@ -162,7 +162,7 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
             case recording:
                 observer.end()
                 if too_fast := runaway(setup, observer.fastest):
-                    recording = replace(recording, outcome=judged(setup, recording, too_fast))
+                    recording = replace(recording, outcome=runaway_outcome(setup, recording, too_fast))
                 return _Ran(setup, engine, observer, recording, run.seconds, remarks, too_fast)
 
 

@@ -1,5 +1,6 @@
 # The tools: type checkers read this file, and __init__.py does.
 from robot_dyn.tools import doctor as doctor
+from robot_dyn.tools import export as export
 from robot_dyn.tools import identify as identify
 from robot_dyn.tools import motors as motors
 from robot_dyn.tools import proof as proof

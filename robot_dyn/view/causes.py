@@ -15,7 +15,7 @@ from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.series import effort_limits
 
 _MOST = 2000  # samples; no slider is wider in pixels of a screen
-_STEPS = 32767  # of 16 bits, for the largest torque of a joint
+_STEPS = 32767  # largest 16-bit integer, for the largest torque of a joint
 
 
 def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:

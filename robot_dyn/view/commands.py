@@ -20,7 +20,7 @@ Command = dict[str, Any]
 Rgba = tuple[float, float, float, float]
 
 _EXTENSION = {"int8": 0x11, "uint8": 0x12, "uint16": 0x14, "uint32": 0x16, "float32": 0x17, "float64": 0x18}
-_KINDS = {"position": "vector", "quaternion": "quaternion", "scale": "vector", "visible": "bool"}  # of tracks
+_KINDS = {"position": "vector", "quaternion": "quaternion", "scale": "vector", "visible": "bool"}  # types of tracks
 _DOUBLE_SIDE = 2  # meshes of real robots have triangles that face the wrong way
 
 

@@ -36,7 +36,7 @@ from robot_dyn.view.sliders import sliders
 from robot_dyn.view.stage import Stage
 from robot_dyn.view.tables import cost_table, settings_table
 
-_MOST_EVENTS = 200  # of a run
+_MOST_EVENTS = 200  # listed events of a run
 _FAR = 1e4  # [rad] or [m]; diverged runs are drawn up to here
 
 
@@ -53,7 +53,7 @@ class Shown:
         prefix: Text before its notes if there are several runs; otherwise empty.
         run: The part of the run that can be drawn.
         stage: Stage of its robot.
-        motion: Its samples, and points between them.
+        motion: Samples of the run, and points between them.
         keys: Keyframes of its joints.
         drawing: The look of its robot.
         hidden: Samples after this part.
@@ -95,7 +95,9 @@ def document_of(
     for item in shown:
         run, stage, start = item.run, item.stage, len(page.notes)
         page.draw(stage, item.drawing, item.keys)
-        traced = frame if frame in stage.linkage.links else run.metadata.get("frame") or stage.tip  # of another robot
+        traced = (
+            frame if frame in stage.linkage.links else run.metadata.get("frame") or stage.tip
+        )  # a frame of another robot is not drawn
         stage.link_path(traced)  # raises if there is none
         frames, note = draw_paths(page.canvas, stage, item.motion, radius, traced)
         page.paths[stage.root] = {"frames": frames, "shown": traced}
@@ -172,7 +174,7 @@ class _Document:
     """The common part of documents of runs and of robots: a scene to which robots are added, and notes."""
 
     def __init__(self, points: np.ndarray, robot: Robot, inertia: bool) -> None:
-        """Begin the scene of points (k, 3) in the base of the first robot, whose gravity points down."""
+        """Start the scene of points (k, 3) in the base of the first robot, whose gravity points down."""
         self._gravity, self._shows_boxes = robot.edits.gravity, inertia
         self._turn = upright(self._gravity)
         self.scenery = scenery(points @ self._turn.T)

@@ -19,7 +19,7 @@ from robot_dyn.simulation.results.run_data import TrajectoryData
 TOLERANCE = 5e-4  # [rad] or [m]; half a millimetre at a reach of one metre, below a pixel of the screen
 CHORD = TOLERANCE / 10  # largest error of lines between the times of a `Motion`
 _LARGEST_TURN = pi / 2  # between keyframes; from π on a viewer would take the shorter way round
-_MOST_PARTS = 64  # of the time between two samples
+_MOST_PARTS = 64  # parts of the time between two samples
 _LOOKS = (0.25, 0.5, 0.75)  # parts of that time at which the polynomial is compared with others
 _CHUNK = 20_000  # samples that are joined at a time
 

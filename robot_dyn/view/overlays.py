@@ -17,13 +17,13 @@ from robot_dyn.view.stage import Stage, plain
 _COM: Rgba = (0.94, 0.89, 0.26, 1.0)
 _TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
 _STOP: Rgba = (0.9, 0.05, 0.05, 0.75)
-_PART = 5e-4  # of the scene: largest error of a path between keyframes
-_LONGEST = 0.4  # of the radius of the scene: the arrow of the largest force or torque of all runs
+_PART = 5e-4  # fraction of the scene: largest error of a path between keyframes
+_LONGEST = 0.4  # fraction of the radius of the scene: the arrow of the largest force or torque of all runs
 _WRENCH: tuple[tuple[str, str, slice, str, Rgba], ...] = (
     ("force", "orange", slice(1, 4), "N", (0.84, 0.37, 0.0, 1.0)),
     ("torque", "pink", slice(4, 7), "N m", (0.8, 0.47, 0.65, 1.0)),
 )
-_MOST_PATHS = 60  # of frames, of a run
+_MOST_PATHS = 60  # drawn paths of frames, per run
 
 
 def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame: str) -> tuple[tuple[str, ...], str]:
@@ -32,7 +32,7 @@ def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame
     Args:
         canvas: Canvas to draw on.
         stage: Stage of the robot.
-        motion: Its samples, and points between them.
+        motion: Samples of the run, and points between them.
         reach: Radius of the scene, in [m].
         frame: Link whose path the page shows when it opens.
 

@@ -22,7 +22,7 @@ from robot_dyn.view.web.text import page_text
 if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
 
-_HEIGHT = 720  # of a frame in a notebook, in pixels
+_HEIGHT = 720  # height of a page in a notebook, in pixels
 PAGE = FileKind("a page", ".html", b"<!DOCTYPE html>")
 
 
@@ -35,8 +35,8 @@ class ReplayError(RobotDynError):
 class Page:
     """A page of `replay` or `show`, which needs neither server nor network.
 
-    As the last value of a notebook's cell it is shown there: in a frame that has no access to the notebook, or as a
-    picture of its first instant where frames are removed. At a prompt, `repr` gives its address.
+    A notebook shows the page as the last value of a cell: in a frame without access to the notebook, or, where frames
+    are removed, as a picture of its first instant. At a prompt, `repr` returns its address.
 
     Attributes:
         document: Contents of the page, for its script.
@@ -63,13 +63,13 @@ class Page:
             ReplayError: If it cannot be written.
         """
         try:
-            folder = Path(mkdtemp(prefix="robot_dyn-"))  # readable for you alone
+            folder = Path(mkdtemp(prefix="robot_dyn-"))  # readable for the owner only
         except OSError as cause:
             raise ReplayError(f"no temporary folder ({why(cause)}); write the page with .save(path)") from None
         return self.save(folder / "page.html").as_uri()
 
     def save(self, path: str | Path) -> Path:
-        """Write it as one HTML file; an existing page of that name is replaced, a file of another kind is not.
+        """Write the page as one HTML file, which replaces an older page but no file of another kind.
 
         Raises:
             ReplayError: If the file cannot be written.
@@ -97,7 +97,7 @@ class Page:
             path: The file.
             fps: Frames per second, 1 to 240, or to 50 for a .gif. Default 60 for an .mp4, 25 for a .gif.
             size: Width and height in pixels, even numbers from 160 to 3840.
-            dark: Whether it is drawn for dark screens.
+            dark: True to draw it for dark screens.
             browser: Path of the browser; the first of this machine if not given.
             on_progress: Called with the finished part, 0 to 1, and the name of the work, in another thread.
 
@@ -112,15 +112,15 @@ class Page:
         return save_video(text, duration, path, fps, size, dark, browser, on_progress)
 
     def serve(self, port: int | None = None) -> Server:
-        """Serve the page live, on this machine only, at the `url` of the returned server, until that is closed.
+        """Serve the page live, on this machine only, at the `url` of the returned server, until the server is closed.
 
-        Other meshcat programs may draw into the scene, at its `zmq_url`.
+        Other meshcat programs can draw into the scene at `zmq_url` of the server.
 
         Args:
             port: Port to listen on; any free one if not given.
 
         Raises:
-            QueryError: If the port is not one.
+            QueryError: If the port is not a whole number from 1 to 65535.
             ServerError: If the port is taken.
         """
         port = None if port is None else integer("port", port, least=1, most=65535)

@@ -16,9 +16,9 @@ from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.view.commands import Command
 
 WIDTH, HEIGHT, _FINE = 720, 480, 2  # [pixels]; drawn larger by the last, and reduced: smooth edges
-_TOP, _BOTTOM = (245, 247, 250), (209, 217, 224)  # of the page's background
+_TOP, _BOTTOM = (245, 247, 250), (209, 217, 224)  # colours of the page's background
 _HALF = np.tan(np.deg2rad(45.0) / 2)  # half of the height that is seen at a distance of 1, as on the page
-_MARGIN = 0.9  # of the picture, for the scene, same as on the page
+_MARGIN = 0.9  # fraction of the picture, for the scene, same as on the page
 _LIGHT = np.array([0.4, -0.5, 0.77])
 
 

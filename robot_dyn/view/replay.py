@@ -32,7 +32,7 @@ def replay(
         *ghosts: Runs shown with it, transparent.
         package_dirs: Folders searched first for the packages of meshes.
         frame: Link whose path is traced.
-        inertia: Whether to draw each link's equivalent box, of the same mass and inertia.
+        inertia: True to draw each link's equivalent box, of the same mass and inertia.
         meshes: "full", the triangles of their files; or "coarse", fewer, for a smaller page.
 
     Raises:
@@ -56,9 +56,9 @@ def show(
 
     Args:
         robot: The robot to show.
-        q: Its configuration, (n,), in [rad] or [m]; 0 if not given.
+        q: Configuration of the robot, (n,), in [rad] or [m]; 0 if not given.
         package_dirs: Folders searched first for the packages of meshes.
-        inertia: Whether to draw each link's equivalent box, of the same mass and inertia.
+        inertia: True to draw each link's equivalent box, of the same mass and inertia.
         meshes: "full", the triangles of their files; or "coarse", fewer, for a smaller page.
 
     Raises:

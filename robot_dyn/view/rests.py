@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _HOLD = {"dry_friction", "rigid_stops"}  # names of effects that hold joints
-_MOST = 200  # of a joint
+_MOST = 200  # rests of a joint
 
 
 class Rest(NamedTuple):

@@ -32,8 +32,8 @@ class Scenery:
     """The visible scene.
 
     Attributes:
-        center: Of a sphere about it, (3,), in [m].
-        radius: Of the sphere, in [m].
+        center: Centre of a sphere around the scene, (3,), in [m].
+        radius: Radius of the sphere, in [m].
         floor: The lowest z, in [m].
         camera: Unit vector from the center to the camera, (3,).
         outline: The outermost points in some directions, (k, 3), which the camera has in view.

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 Columns = dict[str, np.ndarray]  # by name
 
 _BUCKETS = 2000  # no plot is wider in pixels of a screen
-_MOST = 1e38  # of single precision
-_UNSTATED = 1e300  # what a file states from here on limits nothing
+_MOST = 1e38  # largest number in single precision
+_UNSTATED = 1e300  # a limit of this size means none
 
 
 class Curve(NamedTuple):

@@ -35,7 +35,7 @@ class Stage:
     Attributes:
         root: Path of the robot.
         robot: The robot.
-        opacity: Of all that is drawn there.
+        opacity: Opacity of everything drawn at the node.
     """
 
     root: str

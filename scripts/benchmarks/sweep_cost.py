@@ -145,7 +145,7 @@ def overhead(given: argparse.Namespace) -> None:
         setup, spent = replace(plan.setup, estimate_error=False), {"sweep": 0.0, "rollouts": 0.0}
         chunk = 0
         for chunk in range(10**6):
-            start, stop = known.of(chunk)
+            start, stop = known.run_range(chunk)
 
             def sweep(chunk: int = chunk, start: int = start, stop: int = stop) -> None:
                 known.write(chunk, work.rows(start, stop))
@@ -254,7 +254,7 @@ def without_work() -> None:
     def written(self: Folder, chunk: int, *_: Any) -> None:
         self.file(chunk).touch()
 
-    Work.made, Folder.write = (lambda *_: ()), written  # type: ignore[method-assign]
+    Work.run_rows, Folder.write = (lambda *_: ()), written  # type: ignore[method-assign]
 
 
 def scheduler(given: argparse.Namespace) -> None:

@@ -157,8 +157,8 @@ CONTROL = SimpleNamespace(
 class Rope(rd.effects.Conservative):
     """An effect of a user that switches: a rope pulls a joint back beyond the position where it becomes tight."""
 
-    slack: np.ndarray = field(metadata=rd.effects.coefficient("rad", symbol="slack until", elsewhere=9.0))
-    stiffness: np.ndarray = field(metadata=rd.effects.coefficient("N m/rad", symbol="k", least=0))
+    slack: np.ndarray = field(metadata=rd.effects.coefficient("rad", symbol="slack until", fill_value=9.0))
+    stiffness: np.ndarray = field(metadata=rd.effects.coefficient("N m/rad", symbol="k", minimum=0))
 
     def stretch(self, q: Any) -> Any:
         return np.maximum(q - self.slack, 0.0)

@@ -42,7 +42,7 @@ def test_each_implementation_has_the_digits_of_its_numbers(made: Certificate) ->
             else whole.get(each.implementation.removeprefix("Lagrangian, "), 15.95)
         )
         assert most - 3 < each.searched <= each.random <= each.typical <= min(most + 1.5, 20), each
-        assert each.given is not None and most - 2 < each.given <= 20
+        assert each.at_state is not None and most - 2 < each.at_state <= 20
     assert {each.quantity for each in made.digits} == QUANTITIES.keys()
     assert {each.implementation for each in made.digits} == {
         "Pinocchio", "Lagrangian, float32", "Lagrangian, float64", "Lagrangian, longdouble", "articulated body",
@@ -53,16 +53,16 @@ def test_each_implementation_has_the_digits_of_its_numbers(made: Certificate) ->
 @pytest.mark.parametrize("quantity", [M, FORWARD_DYNAMICS], ids=lambda each: each.name)
 def test_digits_are_those_of_the_state_that_is_told(made: Certificate, quantity) -> None:
     """Of M and forward dynamics the scale is that of `rd.accuracy.digits`."""
-    robot, found = rd.load("planar_2r"), made.of(quantity.name, "Pinocchio")
+    robot, found = rd.load("planar_2r"), made.digits_of(quantity.name, "Pinocchio")
     assert (
         rd.accuracy.digits(robot, quantity.name, *(found.state[name] for name in quantity.arguments)) == found.searched
     )
-    assert rd.accuracy.digits(robot, quantity.name, *(GIVEN[name] for name in quantity.arguments)) == found.given
+    assert rd.accuracy.digits(robot, quantity.name, *(GIVEN[name] for name in quantity.arguments)) == found.at_state
 
 
 def test_digits_of_articulated_bodies_follow_from_400_bits(made: Certificate) -> None:
     """By the same recursion in balls of 400 bits, in the norm of M and on the scale, written anew."""
-    found, own = made.of("forward_dynamics", "articulated body"), rd.Lagrangian(rd.load("planar_2r"))
+    found, own = made.digits_of("forward_dynamics", "articulated body"), rd.Lagrangian(rd.load("planar_2r"))
     q, v, tau = (np.array(found.state[name]) for name in ("q", "v", "tau"))
     fine = rd.Lagrangian(own.robot, rd.accuracy.Ball(400))
     with fine.arithmetic.scope():
@@ -187,9 +187,9 @@ def test_ctrl_c_keeps_what_was_counted() -> None:
 
 def test_what_was_not_counted_is_told(made: Certificate) -> None:
     with pytest.raises(rd.RobotDynError, match=r"^no implementation 'pinochio'; nearest: Pinocchio$"):
-        made.of("M", "pinochio")
+        made.digits_of("M", "pinochio")
     with pytest.raises(rd.RobotDynError, match=r"^'articulated body' does not compute M; see .*"):
-        made.of("M", "articulated body")
+        made.digits_of("M", "articulated body")
     with pytest.raises(rd.RobotDynError, match=r"q must have shape \(2,\), got \(1, 2\)"):
         rd.accuracy.certify(rd.load("planar_2r"), q=[[0.1, 0.2]])
 

@@ -239,7 +239,7 @@ def test_the_estimate_is_no_less_than_the_error() -> None:
         ),
         (
             lambda robot, q: rd.accuracy.warn_below(robot, 21),
-            "digits must be at most 20, the most that are counted, got 21",
+            "digits must be at most 20, got 21",
         ),
     ],
 )

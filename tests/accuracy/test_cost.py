@@ -63,14 +63,14 @@ def test_counts_are_those_of_the_programs_that_are_run(control: str) -> None:
         "spring": setup(FRICTION, controller=controller),
         "gravity": rd.Setup(rd.Plant(ARM.with_(gravity=(0, 0, 0)), given.plant.effects), Q, V, 0.1, controller),
     } | ({"control": setup(FRICTION, SPRING)} if controller else {})
-    assert {each.what for each in found.alternatives if each.group == "parts"} == {*without, step_cost.EVERYTHING}
+    assert {each.name for each in found.alternatives if each.group == "parts"} == {*without, step_cost.EVERYTHING}
     for name, other in without.items():
-        row = found.of(name)
+        row = found.comparison(name)
         for version, of in ((row.first, given), (row.second, other)):
             counts = compiled(of)
             assert version.instructions == 4 * counts["rate"] + counts.get("tick", 0)
     bare = compiled(rd.Setup(rd.Plant(ARM.with_(gravity=(0, 0, 0))), Q, V))
-    assert found.of(step_cost.EVERYTHING).second.instructions == 4 * bare["rate"]
+    assert found.comparison(step_cost.EVERYTHING).second.instructions == 4 * bare["rate"]
 
 
 def test_viscous_friction_costs_what_is_counted_by_hand() -> None:
@@ -87,12 +87,15 @@ def test_what_is_off_costs_nothing_and_parts_add_up(control: str) -> None:
     """All on = rigid bodies + each part + what several share; a part never adds to a setup that is without it."""
     given = setup(FRICTION, SPRING, *rd.effects.joint_stops(-1.0, 1.0), controller=CONTROLLERS[control])
     found = rd.accuracy.cost(given, **TINY)
-    whole = found.of(step_cost.EVERYTHING)
+    whole = found.comparison(step_cost.EVERYTHING)
     assert whole.second.instructions + sum(found.parts.values()) + found.shared == whole.first.instructions
     assert all(count > 0 for count in found.parts.values())
     assert abs(found.shared) <= sum(found.parts.values()) / 10
     again = rd.accuracy.cost(replace(given, plant=rd.Plant(ARM, [SPRING, *given.plant.effects[2:]])), **TINY)
-    assert again.of(step_cost.EVERYTHING).first.instructions == found.of("viscous_friction").second.instructions
+    assert (
+        again.comparison(step_cost.EVERYTHING).first.instructions
+        == found.comparison("viscous_friction").second.instructions
+    )
     assert "viscous_friction" not in again.parts
 
 
@@ -153,15 +156,15 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
 
     odd = rd.accuracy.cost(setup(Odd()), **TINY)
     assert any("parts: effect odd cannot be compiled" in each for each in odd.left_out)
-    assert odd.sentence == "no step was counted" and odd.of("forward dynamics")
+    assert odd.sentence == "no step was counted" and odd.comparison("forward dynamics")
     with pytest.raises(QueryError, match="no cost of 'wind'; known: Coriolis matrix"):
-        odd.of("wind")
+        odd.comparison("wind")
 
 
 def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
     monkeypatch.setattr("robot_dyn.accuracy.costs.query_cost._MAX_TIMED", 30)
     found = rd.accuracy.cost(setup(), budget_s=20.0, repeats=1)
-    row = found.of("forward dynamics")
+    row = found.comparison("forward dynamics")
     assert row.first.instructions > 30 and not row.first.times
     why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take long"
     assert any(each.startswith(why) for each in found.left_out)
@@ -172,7 +175,7 @@ def test_the_page_has_the_counts_of_today(tmp_path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(starter("panda_computed_torque"), encoding="utf-8")
     pairs = step_cost.pairs_of_parts(rd.read_scene(scene))
-    counted = {each.what: f"{each.first.instructions} / {each.second.instructions}" for each in pairs}
+    counted = {each.name: f"{each.first.instructions} / {each.second.instructions}" for each in pairs}
     page = (Path(__file__).parents[2] / "docs" / "studies" / "cost.md").read_text(encoding="utf-8")
     told = re.findall(r"^\|[^|]*\| (\w+) \| on / off \| (\d+ / \d+) \|", page, flags=re.MULTILINE)
     assert dict(told) == counted
@@ -232,7 +235,7 @@ def test_json_and_rows_hold_the_alternatives() -> None:
     result = rd.accuracy.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
     read = json.loads(json_text(result))
     kept = result.alternatives
-    names = ("group", "what", "per", "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s")
+    names = ("group", "name", "per", "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s")
     of_one = ("name", "instructions", "time_s", "repeats", "repeatable")
     rows = list(result.rows)
     assert len(read["alternatives"]) == len(rows) == len(kept) and any(pair.first.times for pair in kept)

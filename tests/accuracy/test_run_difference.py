@@ -65,7 +65,7 @@ def test_a_run_does_not_differ_from_itself() -> None:
     found = rd.diff_runs(run, coasting(loaded(1.0)))
     assert all(each.rms == each.largest == 0 for each in found.joints)
     assert found.parted_s is None and found.settings == () and found.left_out == ()
-    assert "are equal at all 51 times" in found.sentence and "no setting differs" in repr(found)
+    assert "are equal at all 51 times" in found.sentence and "all settings are equal" in repr(found)
 
 
 def test_a_known_shift_is_found_with_its_time() -> None:
@@ -226,7 +226,7 @@ def test_runs_that_have_nothing_in_common_are_refused() -> None:
     run = coasting(FREE)
     other = rd.simulate(rd.load("planar_2r"), q0=[0.1, 0.2], duration_s=0.1)
     for a, b in ((run, other), (other, run)):
-        with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; give two of one robot"):
+        with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; compare runs of one robot"):
             rd.diff_runs(a, b)
     named = replace(run, metadata=run.metadata | {"robot": "another"})
     with pytest.raises(QueryError, match="different robots, pendulum and another"):

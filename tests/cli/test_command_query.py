@@ -186,7 +186,7 @@ def test_a_scene_is_asked_at_its_start_for_what_is_held_and_how_firmly(tmp_path:
     assert answer["q"] == [0.3, 0.4]
     assert answer["tau"] == pytest.approx(u, rel=1e-14)
     assert answer["a"] == [0, 0]
-    one, two = answer["held"]
+    one, two = answer["held_joints"]
     assert (one["joint"], one["by"]) == ("joint_1", ["dry_friction", "rigid_stops"])
     assert (two["joint"], two["by"]) == ("joint_2", ["dry_friction"])
     assert (one["load"], two["load"]) == pytest.approx(u - N, rel=1e-13)
@@ -201,7 +201,7 @@ def test_a_scene_is_asked_at_its_start_for_what_is_held_and_how_firmly(tmp_path:
     text = said("query", scene, "--why", "joint_2")
     assert re.search(r"^joint_2 +dry_friction +-\d\S+ +-20 +20 ", text, re.M)
     assert re.search(r"^dry friction and stops, at rest ", text, re.M)
-    assert [(each.joint, each.load) for each in setup.plant.held(setup.q0, setup.v0, u, t=0.0)] == [
+    assert [(each.joint, each.load) for each in setup.plant.held_joints(setup.q0, setup.v0, u, t=0.0)] == [
         ("joint_1", one["load"]), ("joint_2", two["load"])
     ]  # fmt: skip
 

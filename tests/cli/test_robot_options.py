@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 TAKING = {
     "robot_dyn.cli.commands.query": ("info", "query", "compare"), "robot_dyn.cli.commands.show": ("show_",),
     "robot_dyn.cli.commands.cost": ("work_precision", "certify"), "robot_dyn.tools.motors.command": ("budget",),
-    "robot_dyn.tools.stress.command": ("stress",),
+    "robot_dyn.tools.stress.command": ("stress",), "robot_dyn.tools.export.command": ("export_c",),
 }  # fmt: skip
 
 

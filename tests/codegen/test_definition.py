@@ -75,7 +75,7 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Drag(Shape, rd.effects.Dissipative):
-    c: Any = field(default=1.0, metadata=rd.effects.coefficient("N m", least=0))
+    c: Any = field(default=1.0, metadata=rd.effects.coefficient("N m", minimum=0))
     offset: float = 0.25
     then: Any = twice
 

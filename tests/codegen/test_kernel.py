@@ -15,10 +15,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from robot_dyn.codegen import Kernel, program_of
+from robot_dyn.codegen import Kernel, Kind, program_of
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.sine_groups import in_groups
-from robot_dyn.codegen.program import Kind
 from robot_dyn.codegen.threads import shared
 from tests.long import long
 

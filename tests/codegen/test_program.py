@@ -13,14 +13,13 @@ import pytest
 from flint import arb, ctx
 from llvmlite import ir
 
-from robot_dyn.codegen import Kernel, program_of
+from robot_dyn.codegen import Kernel, Kind, Op, Program, Programs, program_of
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.elementary import RANGE
 from robot_dyn.codegen.llvm.machine_code import addresses
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.vectors import F32, F64, I64
 from robot_dyn.codegen.llvm.writer import Writer
-from robot_dyn.codegen.program import Kind, Op, Program, Programs
 from robot_dyn.codegen.store.keys import digest
 from robot_dyn.codegen.trace.from_casadi import OperationError, instructions
 from tests.codegen.test_kernel import Memory

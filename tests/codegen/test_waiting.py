@@ -119,8 +119,8 @@ def test_machine_code_of_a_run_and_of_a_loop_is_logged_and_what_is_there_is_not(
     for _ in range(2):
         assert loop.calls()(2.0) == 4.0
     assert ring(clocks, caplog) == [
-        "compiling the equations of this run, once for its structure",
-        "compiling a function, once for this version",
+        "compiling the equations of this run (cached for runs of the same structure)",
+        "compiling a function (cached for this version)",
     ]
 
 
@@ -136,4 +136,4 @@ def test_machine_code_of_a_robot_and_of_a_batch_is_logged(
     ]
     clocks.clear()
     rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, method="RK4", step_s=1e-3)
-    assert "compiling the equations of this run, once for its structure" in ring(clocks, caplog)
+    assert "compiling the equations of this run (cached for runs of the same structure)" in ring(clocks, caplog)

@@ -166,6 +166,13 @@ TWO = {
     "slower zeros": both(0.01, 0.0 * SMOOTH, every=4, order="by time"),
     "the motion 1 s later": both(0.0125, SMOOTH[::-1], order="by time"),
     "a second arm, 0.3 rad away": both(1e-3, SMOOTH + 0.3, order="by time"),
+    "a copy one step late": both(2e-3, np.roll(SMOOTH, 1, axis=0), order="by time"),
+    "a copy one step late, and long after": both(0.02, np.roll(SMOOTH, 1, axis=0), order="by time"),
+    "a copy two steps late": both(2e-3, np.roll(SMOOTH, 2, axis=0), order="by time"),
+    "a noisy copy three steps late": both(
+        3e-3, np.roll(SMOOTH, 3, axis=0) + 1e-5 * np.random.default_rng(2).standard_normal((81, 6)), order="by time"
+    ),
+    "a copy one step early": both(3e-3, np.roll(SMOOTH, -2, axis=0), order="by time"),
 }
 
 
@@ -190,6 +197,10 @@ GLITCHES[[20, 40, 60], 2] += 1.0
         (T, GLITCHES),
         (T / 50, SMOOTH),  # 50 times too fast, but one motion
         (10 * T, (np.arange(81)[:, None] % 2) * np.full(6, 0.3)),  # way points there and back, within the limits
+        (10 * T, (np.arange(81)[:, None] % 2) * 0.3 + np.linspace(0, 2, 81)[:, None] * np.ones(6)),  # a raster
+        (T, np.repeat(SMOOTH[::2], 2, axis=0)[:81]),  # logged at twice the rate of the state
+        (T + 0.01 * (np.arange(81) % 2), SMOOTH),  # uneven periods
+        (T + 0.01 * (np.arange(81) % 2), SMOOTH + 0.01 * RNG.standard_normal(SMOOTH.shape)),
     ],
 )
 def test_one_publisher_is_not_refused_as_two(t: np.ndarray, q: np.ndarray) -> None:

@@ -167,7 +167,7 @@ def test_a_broken_log_is_refused_by_name(tmp_path: Path, change: Any, message: s
 @pytest.mark.parametrize("options", [{"topic": "/joint_states"}, {"time": "header"}])
 def test_options_of_logs_are_refused_for_other_sources(options: dict[str, str]) -> None:
     table = {"t": T} | dict(zip(NAMES, REST.T, strict=True))
-    with pytest.raises(PlanError, match=r"is for MCAP logs, but the samples are not from one"):
+    with pytest.raises(PlanError, match=r"applies to MCAP logs only"):
         rd.control.from_samples(ARM, table, **options)
 
 

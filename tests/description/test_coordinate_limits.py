@@ -88,6 +88,8 @@ def test_an_unlimited_joint_gets_the_limits_of_its_follower() -> None:
         (follows("drive", -1), 'lower="0" upper="0.5"'),  # a point: the other knuckle states the range of the first
         (follows("drive", 1, 0.7), 'lower="0" upper="0.5"'),  # empty
         (follows("drive", 1), 'lower="0" upper="0.04"'),  # below a tenth of the range
+        (follows("drive", -1, 0.04), 'lower="0" upper="0.5"'),  # 0 to 0.04 of 0.5
+        (follows("drive", 0.5, -1.0), 'lower="0" upper="0.5"'),  # from 2 on
     ],
 )
 def test_a_follower_that_would_leave_hardly_any_range_narrows_nothing_and_is_reported(mimic: str, limits: str) -> None:

@@ -78,6 +78,18 @@ def test_a_link_of_another_density_has_its_mass_and_moments_scaled_together(tmp_
         np.testing.assert_allclose(written.M(q), ours.M(q), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("link", TREE.body_names[:5])
+def test_the_difference_of_two_densities_is_the_link_itself(link: str) -> None:
+    """M and N are affine in the density of a link: M(2) − M(1) = M(3) − M(2), and 1 changes nothing."""
+    q, v, _ = STATES
+    name = next(x for x in TREE.frame_names if x == link) if link in TREE.frame_names else LINK
+    one, two, three = (TREE.with_(mass_scales={name: x}) for x in (1.0, 2.0, 3.0))
+    for of in (lambda arm: arm.M(q), lambda arm: arm.N(q), lambda arm: arm.C(q, v)):
+        np.testing.assert_array_equal(of(one), of(TREE))
+        np.testing.assert_allclose(of(two) - of(one), of(three) - of(two), rtol=0, atol=1e-12 * np.abs(of(three)).max())
+    assert two.total_mass - one.total_mass == pytest.approx(stated(TREE, name)[0], rel=1e-12)
+
+
 def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
     plan = rd.control.quintic(STATES[0], STATES[0] + 0.4, 0.2)
     control = None if model is None else rd.control.ComputedTorque(model, plan, kp=50.0, kd=9.0)

@@ -86,6 +86,42 @@ def test_springs_of_a_joint_and_its_follower_act_like_both() -> None:
         assert torque[0] == pytest.approx(-(5 * (q - 0.1) - 6 * (-2 * q - 0.4)), rel=1e-13)
 
 
+@pytest.mark.parametrize(
+    ("stated", "stiffness", "rest"),
+    [
+        ({"j": '<dynamics spring_stiffness="5" spring_reference="0.1"/>'}, [5.0, 0.0], [0.1, 0.0]),
+        ({"k": '<dynamics stiffness="2"/>'}, [0.0, 2.0], [0.0, 0.0]),
+        ({"more": '<gazebo reference="k"><springStiffness>3</springStiffness></gazebo>'}, [0.0, 3.0], [0.0, 0.0]),
+        # k = -2 j + 0.3: 4 s at the joint, about the position at which k is at rest
+        ({"k": MIMIC + '<dynamics spring_stiffness="3" spring_reference="0.7"/>'}, [12.0], [-0.2]),
+        ({"j": '<dynamics stiffness="1"/>', "k": MIMIC + '<dynamics stiffness="1"/>'}, [5.0], [0.12]),
+    ],
+)
+def test_a_stated_spring_is_reported_with_its_stiffness_and_rest(
+    stated: dict[str, str], stiffness: list[float], rest: list[float]
+) -> None:
+    arm = robot(**stated)
+    np.testing.assert_allclose(arm.stated_stiffness, stiffness, rtol=1e-14)
+    np.testing.assert_allclose(arm.stated_rest, rest, rtol=1e-14, atol=1e-15)
+    assert any("spring" in finding for finding in arm.findings)
+
+
+@pytest.mark.parametrize(
+    ("stated", "lower", "upper"),
+    [
+        ({"j": '<safety_controller k_velocity="9" soft_lower_limit="-0.3"/>'}, [-0.3, -np.inf], [np.inf, np.inf]),
+        ({"k": '<safety_controller k_velocity="9" soft_upper_limit="0.4"/>'}, [-np.inf, -np.inf], [np.inf, 0.4]),
+        ({"j": '<safety_controller k_velocity="9"/>'}, [-np.inf, -np.inf], [np.inf, np.inf]),
+        ({}, [-np.inf, -np.inf], [np.inf, np.inf]),
+    ],
+)
+def test_soft_limits_that_the_file_does_not_state_are_infinite(
+    stated: dict[str, str], lower: list[float], upper: list[float]
+) -> None:
+    arm = robot(**stated)
+    assert arm.soft_lower.tolist() == lower and arm.soft_upper.tolist() == upper
+
+
 def test_soft_limits_are_those_of_the_safety_controller() -> None:
     arm = robot(j='<safety_controller k_velocity="9" soft_lower_limit="-0.3" soft_upper_limit="0.2"/>')
     assert arm.soft_lower.tolist() == [-0.3, -np.inf]

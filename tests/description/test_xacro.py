@@ -75,7 +75,7 @@ def test_a_xacro_file_without_expressions_is_refused_too(name: str, tmp_path: Pa
     with pytest.raises(DescriptionError, match="is a xacro file; expand the file"):
         rd.load(file)
     (finding,) = rd.tools.doctor.check_urdf(file).findings
-    assert (finding.kind, finding.what) == ("refused", "is a xacro file")
+    assert (finding.kind, finding.message) == ("refused", "is a xacro file")
     assert rd.load(file, xacro={}).total_mass == rd.Robot.from_text(ARM).total_mass + 7.5
 
 

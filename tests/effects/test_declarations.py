@@ -50,7 +50,7 @@ def engine_of(part: Any) -> str:
 class Declared(rd.effects.Dissipative):
     """τ = −c tanh(v): what is written outside of the library, and declared."""
 
-    c: Any = field(metadata=rd.effects.coefficient("N m", symbol="c", least=0))
+    c: Any = field(metadata=rd.effects.coefficient("N m", symbol="c", minimum=0))
 
     def thresholds(self, n=0):
         return ()
@@ -125,7 +125,7 @@ class Remembers(rd.effects.Active):
 
 @dataclass(frozen=True, eq=False)
 class Cached(rd.effects.Active):
-    c: Any = field(default=2.0, metadata=rd.effects.coefficient("N m s/rad", least=0))
+    c: Any = field(default=2.0, metadata=rd.effects.coefficient("N m s/rad", minimum=0))
 
     def thresholds(self, n=0):
         return ()
@@ -380,7 +380,7 @@ def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_struc
     assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.effects.Spring(5.0)]))).statistics.engine == "compiled"
     other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.effects.Spring(5.0)])
     engine = rd.simulate(replace(base, plant=other)).statistics.engine
-    assert engine == "interpreted (short: compiling is not worthwhile)"
+    assert engine == "interpreted (the run is too short to compile)"
 
 
 class _Stiff:
@@ -722,8 +722,8 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
     ("keys", "said"),
     [
         ("", r"effect 1 \(drag\).c: is missing; give it"),
-        ("c = 1.0\nd = 2.0", r"effect 1 \(drag\).d: is not a key here; known: kind, c, on"),
-        ("c = 1.0\nargument_0 = 2.0", r"effect 1 \(drag\).argument_0: is not a key here"),
+        ("c = 1.0\nd = 2.0", r"effect 1 \(drag\).d: unknown key; known: kind, c, on"),
+        ("c = 1.0\nargument_0 = 2.0", r"effect 1 \(drag\).argument_0: unknown key"),
         ("c = 1" + "0" * 400, "c must be .* too large for a float"),
         ("c = inf", "c must be"),
         ("c = {elbow = 1.0}", "elbow"),

@@ -56,8 +56,8 @@ def test_a_load_above_friction_moves_by_what_is_left() -> None:
 class Drag(rd.effects.Dissipative):
     """τ = −c v, with c under the names that set-valued effects give their mode."""
 
-    held: Any = field(metadata=coefficient("N m s/rad", least=0))
-    _direction: Any = field(metadata=coefficient("N m s/rad", least=0))
+    held: Any = field(metadata=coefficient("N m s/rad", minimum=0))
+    _direction: Any = field(metadata=coefficient("N m s/rad", minimum=0))
 
     def thresholds(self, n: int) -> tuple[()]:
         return ()

@@ -26,7 +26,7 @@ QUERIES: Mapping[str, Callable[..., Any]] = {
     "forward_dynamics": lambda plant, **at: plant.forward_dynamics(Q, V, U, **at),
 }
 OF_PLANTS: Mapping[str, Callable[..., Any]] = {
-    "held": lambda plant, **at: plant.held(Q, V, U, **at),
+    "held": lambda plant, **at: plant.held_joints(Q, V, U, **at),
     "linearise": lambda plant, **at: rd.linearise(plant, Q, V, U, **at).A,
     "why": lambda plant, **at: rd.why(plant, Q, V, U, "joint_1", **at).tau,
 }

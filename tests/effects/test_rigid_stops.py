@@ -54,8 +54,8 @@ def test_without_loss_energy_stays_over_a_thousand_impacts() -> None:
 class OneWay(rd.effects.Dissipative):
     """A damper of motion upwards alone: its formula changes where v = 0."""
 
-    up: Any = field(metadata=rd.effects.coefficient("N m s/rad", symbol="b", least=0))
-    down: Any = field(default=0.0, metadata=rd.effects.coefficient("N m s/rad", symbol="b₋", least=0))
+    up: Any = field(metadata=rd.effects.coefficient("N m s/rad", symbol="b", minimum=0))
+    down: Any = field(default=0.0, metadata=rd.effects.coefficient("N m s/rad", symbol="b₋", minimum=0))
 
     def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
         return -self.up * np.maximum(v, 0.0) - self.down * np.minimum(v, 0.0)

@@ -198,7 +198,7 @@ def test_names_of_other_kinds_and_missing_folders_are_refused(old: Path, tmp_pat
     refused("is a folder", tmp_path / "folder")
     refused("there is no folder .*none; create it first", tmp_path / "none" / "x.note")
     refused("there is no folder", old / "y.note")
-    refused(r"'\.txt' is not the suffix of a note; end the name with \.note", tmp_path / "x.txt")
+    refused(r"'\.txt' is not a suffix for a note; use \.note", tmp_path / "x.txt")
     refused("embedded null", tmp_path / "x\0.note")
     refused("too long", tmp_path / ("x" * 5000))
     assert target(tmp_path / "y", NOTE, QueryError) == tmp_path / "y.note"
@@ -258,7 +258,7 @@ def test_the_public_functions_replace_their_own_kind_and_no_other(run, tmp_path:
         path.write_text("robot = 'pendulum'")
         with pytest.raises(RobotDynError, match="so it is not replaced"):
             write(path)
-        with pytest.raises(RobotDynError, match=r"'\.toml' is not the suffix"):
+        with pytest.raises(RobotDynError, match=r"'\.toml' is not a suffix"):
             write(tmp_path / "x.toml")
         assert path.read_text() == "robot = 'pendulum'"
 

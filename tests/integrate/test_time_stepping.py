@@ -226,7 +226,7 @@ def test_it_estimates_no_error_and_finds_no_events() -> None:
     run = rd.simulate(plant, [0.3, 0.2], duration_s=0.1, step_s=1e-3, method="MoreauJean")
     assert run.error.ends_early.kind is DoubtKind.NO_ORDER_OF_IMPACTS
     event = rd.Event(lambda t, q, v: q[0] - 0.25)
-    with pytest.raises(QueryError, match="MoreauJean cannot end at them; take method='DOP853'"):
+    with pytest.raises(QueryError, match="MoreauJean cannot end at them; use method='DOP853'"):
         rd.simulate(plant, [0.3, 0.2], step_s=1e-3, method="MoreauJean", events=[event])
     with pytest.raises(QueryError, match="1e-06 beyond its upper stop"):
         rd.simulate(

@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.effects.plant_state import plant_state
-from robot_dyn.foundations import QueryError
+from robot_dyn.foundations import DescriptionError, QueryError
 from robot_dyn.model.remarks import degree_lines
 
 LINK = '<inertial><origin xyz="0.3 0 0"/><mass value="{mass}"/>\
@@ -48,6 +48,23 @@ def test_the_order_of_the_file_is_that_of_its_joints() -> None:
     assert rd.info(TWO).file_order == TWO.file_order
     assert any("shoulder_b, shoulder_a" in line for line in plant_state(TWO, IN_ORDER, [0, 0], [0, 0]).remarks)
     assert not plant_state(rd.load("planar_2r"), [0, 0], [0, 0], [0, 0]).remarks
+
+
+@pytest.mark.parametrize(
+    ("file", "q"),
+    [
+        ("ab", "ab"),
+        ("ba", "ab"),  # two joints on the base: by name
+        ("cab", "abc"),
+        ("acb", "abc"),
+        ("cba", "abc"),
+    ],
+)
+def test_joints_of_one_link_are_in_the_order_of_their_names(file: str, q: str) -> None:
+    arm = robot(*(part for x in file for part in (joint(x, "base", f"l{x}", "0 1 0"), link(f"l{x}", 1.0))))
+    assert (arm.file_order, arm.joint_names) == (tuple(file), tuple(q))
+    remarks = plant_state(arm, *[np.zeros(arm.n)] * 3).remarks
+    assert any("order of q" in line for line in remarks) is (file != q) is ("order of q" in repr(arm))
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos_left_arm", "baxter"])
@@ -208,8 +225,20 @@ def test_values_that_name_the_nearest_are_copied_and_pickled(owner: Any) -> None
     assert not hasattr(owner, "_repr_of_nobody_") and not hasattr(owner, "__array__")
 
 
-def test_both_joints_of_a_link_with_two_parents_are_named() -> None:
-    from robot_dyn.foundations import DescriptionError
+ARM = joint("a", "base", "l1", "0 0 1"), link("l1", 1.0), joint("b", "l1", "l2", "0 1 0"), link("l2", 1.0)
 
-    with pytest.raises(DescriptionError, match=r"'first'.*'second'.*mimic"):
-        robot(joint("first", "base", "l1", "0 0 1"), joint("second", "base", "l1", "0 0 1"), link("l1", 1.0))
+
+@pytest.mark.parametrize(
+    ("parts", "joints"),
+    [
+        ((joint("first", "base", "l1", "0 0 1"), joint("second", "base", "l1", "0 0 1"), link("l1", 1.0)),
+         ("first", "second")),
+        ((*ARM, joint("rod", "base", "l2", "0 1 0")), ("b", "rod")),  # a palletiser
+        ((joint("rod", "base", "l2", "0 1 0"), *ARM), ("rod", "b")),
+        ((*ARM, joint("weld", "base", "l2", "0 1 0", "fixed")), ("b", "weld")),
+        ((*ARM, joint("slide", "l1", "l2", "1 0 0", "prismatic")), ("b", "slide")),
+    ],
+)  # fmt: skip
+def test_both_joints_of_a_link_with_two_parents_are_named(parts: tuple[str, ...], joints: tuple[str, str]) -> None:
+    with pytest.raises(DescriptionError, match=rf"'{joints[0]}'.*'{joints[1]}'.*mimic"):
+        robot(*parts)

@@ -117,10 +117,10 @@ def stated(value: Any, known: Any, form: str) -> tuple[str, Any]:
     """A value of an example in TOML: as it is, or by joint, some joints left out; and the value that this means."""
     if form == "as it is" or not isinstance(value, list) or not known.of_joints:
         return json.dumps(value), value
-    required = known.above is not None and known.elsewhere <= known.above
+    required = known.exclusive_minimum is not None and known.fill_value <= known.exclusive_minimum
     joints = [0, 1] if required or form == "by joint" else [int(np.argmax(np.abs(value)))]
     table = ", ".join(f"joint_{i + 1} = {value[i]}" for i in joints)
-    return f"{{{table}}}", [value[i] if i in joints else known.elsewhere for i in (0, 1)]
+    return f"{{{table}}}", [value[i] if i in joints else known.fill_value for i in (0, 1)]
 
 
 @pytest.mark.parametrize("form", ["as it is", "by joint", "joints left out"])
@@ -212,7 +212,7 @@ def test_a_missing_scene_is_told(tmp_path) -> None:
 
 
 def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:
-    with pytest.raises(SceneError, match="line 3: x: is not a key here"):
+    with pytest.raises(SceneError, match="line 3: x: unknown key"):
         parse_scene('robot = "none"\nduration_s = 1.0\nx = 1', "here")
 
 

@@ -202,7 +202,7 @@ def test_auto_compiles_where_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations times their cost: a second of motion is short, an hour is not."""
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.01)), Q, duration_s=1.0, method="RK4")
-    assert choose(setup).label == "interpreted (short: compiling is not worthwhile)"
+    assert choose(setup).label == "interpreted (the run is too short to compile)"
     long = replace(setup, duration_s=3600.0)
     assert choose(long).label == "compiled"
 
@@ -212,7 +212,7 @@ def test_auto_compiles_what_is_asked_for_again_as_often_as_compiling_takes(monke
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.02)), Q, duration_s=1.0, method="RK4")
     said = [choose(setup).label for _ in range(3)]
-    assert said[0] == "interpreted (short: compiling is not worthwhile)"
+    assert said[0] == "interpreted (the run is too short to compile)"
     assert said[2] == "compiled"
 
 
@@ -233,7 +233,7 @@ def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tm
         return said, np.array(q, float), float(error)
 
     before, made, after = run("auto"), run("compiled"), run("auto")
-    assert before[0] == "interpreted (short: compiling is not worthwhile)"
+    assert before[0] == "interpreted (the run is too short to compile)"
     assert [made[0], after[0]] == ["compiled", "compiled"]
     assert np.array_equal(made[1], after[1])
     assert np.abs(before[1] - after[1]).max() <= before[2] + after[2]

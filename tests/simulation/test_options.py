@@ -34,7 +34,7 @@ def test_the_signature_shows_every_attribute_of_a_setup_with_its_default(functio
         assert shown[name].kind is Parameter.KEYWORD_ONLY
         built = {} if name == "metadata" else stated[name].default  # of the factory, which says nothing
         assert shown[name].default == built, name
-    assert list(shown)[:3] == ["what", "q0", "v0"]
+    assert list(shown)[:3] == ["system", "q0", "v0"]
     assert not any(each.kind is Parameter.VAR_KEYWORD for each in shown.values())
 
 

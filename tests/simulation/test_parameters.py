@@ -151,8 +151,8 @@ def test_sweeps_are_held_to_what_is_declared() -> None:
 class Drag(rd.effects.Dissipative):
     """A user's own effect with declared coefficients, in a controller's neighbourhood of other names."""
 
-    strength: np.ndarray = field(metadata=rd.effects.coefficient("N m", symbol="s", least=0, stated="damping"))
-    scale: float = field(default=0.1, metadata=rd.effects.coefficient("rad/s", above=0))
+    strength: np.ndarray = field(metadata=rd.effects.coefficient("N m", symbol="s", minimum=0, stated="damping"))
+    scale: float = field(default=0.1, metadata=rd.effects.coefficient("rad/s", exclusive_minimum=0))
 
     def torque(self, dynamics, t, q, v):
         return -self.strength * tanh(v / self.scale)
@@ -164,7 +164,7 @@ class Follower(rd.control.Stateless):
 
     path: rd.control.PiecewisePolynomial
     arm: rd.Robot
-    gain: np.ndarray = field(metadata=rd.effects.coefficient("1/s²", least=0))
+    gain: np.ndarray = field(metadata=rd.effects.coefficient("1/s²", minimum=0))
     n: int = 2
 
     def torque(self, t, q, v, z):

@@ -16,7 +16,7 @@ from site_parts import reasons
 
 @pytest.mark.parametrize("reason", Reason)
 def test_every_reason_is_explained_on_the_page(reason: Reason) -> None:
-    assert reasons.docstrings()[reason].endswith(".")
+    assert reasons.docstrings(Reason)[reason].endswith(".")
     assert f"`Reason.{reason.name}`" in reasons.page("")
 
 

@@ -238,6 +238,7 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     run = rd.simulate(damped(joint, 2.2))
     said = remark_lines(run.remarks)
     assert len(said) >= 2
+    assert [str(remark) for remark in run.remarks] == [remark_lines([remark])[0] for remark in run.remarks]
     assert all(line in run.summary for line in said)
     title = headings(rd.plot(run, "torques"))
     assert all(line in title for line in said)

@@ -293,7 +293,7 @@ def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_p
     monkeypatch.chdir(tmp_path)
     rd.rollouts(SETUP, starts(3), V).save("runs.npz")
     text = refusal((command[0], "runs.npz", *command[1:]))
-    assert "is a batch of 3 runs" in text and "[0].save(" in text
+    assert "contains 3 runs" in text and "[0].save(" in text
     rd.read("runs.npz")[0].save("run.npz")
     assert said(command[0], "run.npz", *command[1:])
 
@@ -383,7 +383,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "vary must give values by name, .*3": {"vary": {3: ones}},
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
-        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
+        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: use a longer record_every_s": {
             "q0": starts(4), "max_bytes": 100,
         },
     }.items():  # fmt: skip

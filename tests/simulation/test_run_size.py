@@ -38,7 +38,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
 def test_a_run_that_ends_at_a_time_that_floats_do_not_tell_is_refused(duration: float) -> None:
     """A method that chooses its steps is bounded by no number of them; from 2^43 s floats lie 2 ms apart and more."""
     for run in (rd.simulate, rd.rollouts, rd.accuracy.work_precision):
-        with pytest.raises(QueryError, match=r"ends at a time that floats resolve to .* take a shorter duration_s, "):
+        with pytest.raises(QueryError, match=r"ends at a time that floats resolve to .* use a shorter duration_s, "):
             run(ARM, [0.1, 0.2], duration_s=duration)
 
 

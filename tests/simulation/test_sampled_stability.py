@@ -38,7 +38,10 @@ def test_a_short_run_makes_no_loop_stable(period: float, duration: float) -> Non
     assert advice.period_growth == pytest.approx(radius, rel=1e-6)
     assert advice.growth == pytest.approx(radius ** (duration // period), rel=1e-6)
     assert "unstable; the loop is stable up to 0.05 s: use period_s=0.02, or lower gains" in advice.text
-    assert f"over this run deviations grow by {advice.growth:.4g}, by {radius:.4g} in each period" in advice.text
+    assert (
+        f"deviations grow by a factor of {advice.growth:.4g} over this run, by {radius:.4g} in each period"
+        in advice.text
+    )
     assert (advice.run is None) == (advice.growth > 1e3)  # what the run bears is run
 
 
@@ -63,7 +66,7 @@ def test_a_period_is_judged_itself_where_a_shorter_one_is_unstable() -> None:
         advice = rd.advise(replace(loop, period=float(period)).setup())
         assert advice.longest_period_s == pytest.approx(first, rel=1e-3)
         assert advice.stable == stable, period
-    assert f"stable; but not every shorter one: the loop is stable up to {first:.3g} s" in advice.text
+    assert f"stable; some shorter periods are unstable: the loop is stable up to {first:.3g} s" in advice.text
 
 
 def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
@@ -84,7 +87,7 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
     )
     assert advice.stable
     assert advice.at_period is Stability.MARGINAL
-    assert f"none grows up to a period of {advice.longest_period_s:.3g} s" in advice.text
+    assert f"no deviation grows up to a period of {advice.longest_period_s:.3g} s" in advice.text
     assert radius(advice.longest_period_s) <= 1 < radius(1.001 * advice.longest_period_s)
 
 

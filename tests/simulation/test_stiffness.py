@@ -31,7 +31,7 @@ def test_a_damper_is_named_with_its_joint(b: list[float], joint: str) -> None:
     expected = np.linalg.eigvals(-np.linalg.solve(ARM.M(STATE[:2]), np.diag(b)))
     assert made.eigenvalue == pytest.approx(expected.real.min(), rel=1e-4)
     assert (made.joint, made.source) == (joint, "viscous_friction")
-    assert str(made).startswith("the fastest motion, of joint ") and "decays at" in str(made)
+    assert str(made).startswith("the fastest motion, at joint ") and "decays at" in str(made)
 
 
 def test_springs_control_and_narrow_friction_are_told_apart() -> None:
@@ -64,8 +64,8 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     (remark,) = (each for each in stiff.remarks if each.kind is RemarkKind.STIFF)
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
-    assert "steps bounded by stability: the fastest motion, of joint " in stiff.summary
-    assert "because of 'viscous_friction'; use method='Rodas5P'" in stiff.summary
+    assert "steps bounded by stability: the fastest motion, at joint " in stiff.summary
+    assert "due to 'viscous_friction'; use method='Rodas5P'" in stiff.summary
     short = rd.simulate(ARM, **options | {"duration_s": 20.0, "method": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     assert short.statistics.steps > 1000
     assert not [each for each in short.remarks if each.kind is RemarkKind.STIFF]
@@ -78,7 +78,7 @@ def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: 
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 1.0
     assert re.search(
-        "of joint 'joint_2', decays at .* because of 'viscous_friction': take Rodas5P, softer", run.outcome.text
+        "at joint 'joint_2', decays at .* due to 'viscous_friction': use Rodas5P, softer", run.outcome.text
     )
 
 
@@ -93,7 +93,7 @@ def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> No
     )  # estimates may be 0.3 of it
     (remark,) = (each for each in chosen.remarks if each.kind is RemarkKind.STIFF)
     assert remark.joint == "joint_2"
-    assert "because of 'viscous_friction'; made by Rodas5P instead of DOP853" in chosen.summary
+    assert "due to 'viscous_friction'; made by Rodas5P instead of DOP853" in chosen.summary
 
 
 @pytest.mark.parametrize(

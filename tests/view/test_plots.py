@@ -258,7 +258,7 @@ def test_the_suffix_says_the_format(cart, tmp_path, suffix: str, opening: bytes)
 
 
 def test_targets_that_cannot_be_written_are_refused(cart, tmp_path) -> None:
-    with pytest.raises(PlotError, match=r"'.jpeg' is not the suffix of a plot; .*\.png, \.svg, \.pdf"):
+    with pytest.raises(PlotError, match=r"'.jpeg' is not a suffix for a plot; .*\.png, \.svg, \.pdf"):
         plot(cart).save(tmp_path / "plot.jpeg")
     with pytest.raises(PlotError, match="is a folder"):
         plot(cart).save(tmp_path)
@@ -437,7 +437,7 @@ def test_vector_files_have_the_width(run, tmp_path, suffix: str, page: bytes) ->
 def test_many_remarks_leave_room_for_the_curves(run) -> None:
     """The last line says where the others are."""
     long = replace(
-        run, outcome=Outcome(Reason.CANNOT_EVALUATE, run.outcome.t, facts={"error": "take a smaller step, " * 90})
+        run, outcome=Outcome(Reason.CANNOT_EVALUATE, run.outcome.t, facts={"error": "use a smaller step, " * 90})
     )
     figure = plot(long)
     assert figure.get_size_inches()[1] * MM <= 297 and "the summary has all remarks" in headings(figure)

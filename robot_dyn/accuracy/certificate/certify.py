@@ -53,14 +53,14 @@ class Condition:
     """κ of M scaled to a unit diagonal; inf where M is singular.
 
     Attributes:
-        given: κ at the given state; None if none was given.
+        at_state: κ at the additional state of the user; None without one.
         typical: Median over the random states.
         random: Largest κ over the random states.
         searched: Largest κ found.
         q: Configuration of the largest κ found.
     """
 
-    given: float | None
+    at_state: float | None
     typical: float
     random: float
     searched: float
@@ -92,7 +92,7 @@ class Certificate(Result):
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.certificate.diagram"
     columns: ClassVar[tuple[str, ...]] = (
-        "quantity", "implementation", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+        "quantity", "implementation", "at_state", "typical", "samples", "random", "searched", "time_s", "repeats",
         "repeatable",
     )  # fmt: skip
     robot: str
@@ -114,10 +114,10 @@ class Certificate(Result):
         )
         yield "dynamics to the largest entry in the units √M_ii of the joints, or its rms at random states if larger;"
         yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
-        has_given = any(count.given is not None for count in self.digits)
-        counts = ("typical", "worst of", "random", "searched", "time")
-        headings = ("quantity", "implementation", *["given"] * has_given, *counts)
-        yield Table(headings, tuple(self._digit_rows(has_given)), right=headings[2:])
+        has_state = any(count.at_state is not None for count in self.digits)
+        counts = ("typical", "samples", "random", "searched", "time")
+        headings = ("quantity", "implementation", *["at state"] * has_state, *counts)
+        yield Table(headings, tuple(self._digit_rows(has_state)), right=headings[2:])
         condition = self.condition
         loss = f": up to {condition.digits:.1f} digits lost in forward dynamics" if isfinite(condition.digits) else ""
         yield (
@@ -133,7 +133,7 @@ class Certificate(Result):
             )
         yield "times of one query from Python, the least of calls that take turns; at most 20 digits are counted"
 
-    def of(self, quantity: str, implementation: str) -> CountedDigits:
+    def digits_of(self, quantity: str, implementation: str) -> CountedDigits:
         """Return the digits of one quantity by one implementation.
 
         Raises:
@@ -191,14 +191,22 @@ class Certificate(Result):
     def _of(self, quantity: str) -> Iterator[CountedDigits]:
         return (count for count in self.digits if count.quantity == quantity)
 
-    def _digit_rows(self, has_given: bool) -> Iterator[tuple[str, ...]]:
+    def _digit_rows(self, has_state: bool) -> Iterator[tuple[str, ...]]:
         """Return a row for each implementation, and one for the decimals of the file, by quantity."""
         for quantity in self.quantities:
             for count in self._of(quantity):
-                given = ["—" if count.given is None else f"{count.given:.1f}"] * has_given
+                at_state = ["—" if count.at_state is None else f"{count.at_state:.1f}"] * has_state
                 worst, time = (f"{count.random:.1f}", f"{count.searched:.1f}"), format_duration(count.time_s)
-                yield quantity, count.implementation, *given, f"{count.typical:.1f}", str(count.samples), *worst, time
-            yield quantity, DECIMALS, *[""] * (3 + has_given), f"{self.decimals[quantity]:.1f}", ""
+                yield (
+                    quantity,
+                    count.implementation,
+                    *at_state,
+                    f"{count.typical:.1f}",
+                    str(count.samples),
+                    *worst,
+                    time,
+                )
+            yield quantity, DECIMALS, *[""] * (3 + has_state), f"{self.decimals[quantity]:.1f}", ""
 
 
 def certify(
@@ -239,12 +247,12 @@ def certify(
     samples = integer("samples", samples, least=_MIN_SAMPLES, most=_MAX_SAMPLES)
     seed, repeats = integer("seed", seed, most=2**128 - 1), integer("repeats", repeats, least=1, most=_MAX_REPEATS)
     report = function("on_progress", on_progress, "(fraction, task)") or (lambda fraction, task: None)
-    given = _state(robot, q, v, a, tau)
+    state = _state(robot, q, v, a, tau)
     rng = np.random.default_rng(seed)
     states = random_states(robot, samples, rng)
     report(0.0, "machine code")
     options, left_out = implementations(robot)
-    digit_count, counts = DigitCount(robot, states, given, rng), list[CountedDigits]()
+    digit_count, counts = DigitCount(robot, states, state, rng), list[CountedDigits]()
     quantities = [quantity for quantity in QUANTITIES.values() if quantity in options[0].quantities]
     try:
         for k, quantity in enumerate(quantities):
@@ -262,7 +270,7 @@ def certify(
         digits=tuple(counts),
         decimals=digit_count.decimals,
         right_angles=digit_count.right_angles,
-        condition=_condition(robot, states, given, rng),
+        condition=_condition(robot, states, state, rng),
         bits=digit_count.bits,
         left_out=tuple(left_out),
         environment=processor_and_versions(),
@@ -297,7 +305,7 @@ def _count_and_time(
     report: Callable[[float, str], object],
 ) -> list[CountedDigits]:
     """Return digits and times of one quantity by each implementation; append failures to `left_out`."""
-    counts, calls, state = list[CountedDigits](), {}, digit_count.given or row(digit_count.states, 0)
+    counts, calls, state = list[CountedDigits](), {}, digit_count.state or row(digit_count.states, 0)
     for k, implementation in enumerate(options):
         report(k / len(options), f"{quantity.name}: {implementation.name}")
         try:
@@ -308,9 +316,9 @@ def _count_and_time(
     bits = digit_count.truth(digit_count.robot, quantity, state).bits
     name, most = f"balls, {bits} bits", float(MOST_DIGITS)
     calls[name] = _call(Lagrangian(digit_count.robot, Ball(bits)), quantity, state)
-    given = None if digit_count.given is None else most
+    at_state = None if digit_count.state is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}
-    counts.append(CountedDigits(quantity.name, name, given, most, most, most, 1, state=at))
+    counts.append(CountedDigits(quantity.name, name, at_state, most, most, most, 1, state=at))
     report(1.0, f"{quantity.name}: times")
     times = in_turns(calls, repeats, _MIN_LOOP_S)
     return [replace(count, times=tuple(times[count.implementation])) for count in counts]
@@ -321,15 +329,15 @@ def _call(engine: Engine, quantity: Quantity, state: dict[str, np.ndarray]) -> C
     return partial(getattr(engine, quantity.name), *(state[name] for name in quantity.arguments))
 
 
-def _condition(robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator) -> Condition:
+def _condition(robot: Robot, states: Batch, state: dict[str, np.ndarray] | None, rng: np.random.Generator) -> Condition:
     """Return κ of M at the states, and its largest value from a search."""
 
     def conditions(states: Batch) -> np.ndarray:
         return unit_diagonal_conditions(evaluate(robot, M, states))
 
     if robot.joint_without_inertia is not None:
-        return Condition(None if given is None else inf, inf, inf, inf, ())
+        return Condition(None if state is None else inf, inf, inf, inf, ())
     sampled = conditions(states)
     worst, largest = worst_state(states, rng, conditions, sampled, ("q",))
-    at_given = None if given is None else float(conditions({"q": given["q"][None]})[0])
-    return Condition(at_given, float(np.median(sampled)), float(sampled.max()), largest, tuple(worst["q"][0].tolist()))
+    at_state = None if state is None else float(conditions({"q": state["q"][None]})[0])
+    return Condition(at_state, float(np.median(sampled)), float(sampled.max()), largest, tuple(worst["q"][0].tolist()))

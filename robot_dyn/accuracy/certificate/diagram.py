@@ -58,5 +58,5 @@ def _draw_count(axes: Axes, count: CountedDigits, colour: str, colours: Colours)
     axes.plot([t], [count.random], marker="_", color=colour, markersize=11, markeredgewidth=1.5)
     face = colour if count.repeatable else colours["paper"]
     axes.plot([t], [count.searched], marker="o", color=colour, markersize=5, markerfacecolor=face)
-    if count.given is not None:
-        axes.plot([t], [count.given], marker="x", color=colours["ink"], markersize=6)
+    if count.at_state is not None:
+        axes.plot([t], [count.at_state], marker="x", color=colours["ink"], markersize=6)

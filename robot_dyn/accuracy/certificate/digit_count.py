@@ -109,7 +109,7 @@ class CountedDigits(Repeated):
     Attributes:
         quantity: Name of the quantity.
         implementation: Name of the implementation, with its arithmetic.
-        given: Digits at the additional state of the user; None without one.
+        at_state: Digits at the additional state of the user; None without one.
         typical: Median over the random states.
         random: Digits at the worst random state.
         searched: Digits at the worst state found.
@@ -119,7 +119,7 @@ class CountedDigits(Repeated):
 
     quantity: str
     implementation: str
-    given: float | None
+    at_state: float | None
     typical: float
     random: float
     searched: float
@@ -134,7 +134,7 @@ class DigitCount:
     Args:
         robot: The robot.
         states: The random states.
-        given: An additional state, or None.
+        state: An additional state, or None.
         rng: Random generator of the search.
 
     Attributes:
@@ -143,8 +143,8 @@ class DigitCount:
         bits: Highest precision of the balls so far.
     """
 
-    def __init__(self, robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator):
-        self.robot, self.states, self.given, self._rng = robot, states, given, rng
+    def __init__(self, robot: Robot, states: Batch, state: dict[str, np.ndarray] | None, rng: np.random.Generator):
+        self.robot, self.states, self.state, self._rng = robot, states, state, rng
         self.decimals: dict[str, float] = {}
         self.right_angles: dict[str, float] = {}
         self.bits = 0
@@ -180,16 +180,18 @@ class DigitCount:
         worst_random = row(states, int(np.nanargmax(sampled)))
         worst, _ = worst_state(states, self._rng, errors, sampled, quantity.arguments, **sizes)
         check()
-        judged = [(self.judged(implementation, quantity, state), state) for state in (worst_random, row(worst, 0))]
-        largest, state = max(judged, key=lambda pair: pair[0])
-        given = None if self.given is None else digits_of(self.judged(implementation, quantity, self.given))
+        worst_errors = [
+            (self.error_at(implementation, quantity, state), state) for state in (worst_random, row(worst, 0))
+        ]
+        largest, state = max(worst_errors, key=lambda pair: pair[0])
+        at_state = None if self.state is None else digits_of(self.error_at(implementation, quantity, self.state))
         self._count_file(implementation, quantity, state)
         return CountedDigits(
             quantity=quantity.name,
             implementation=implementation.name,
-            given=given,
+            at_state=at_state,
             typical=digits_of(float(np.nanmedian(sampled))),
-            random=digits_of(judged[0][0]),
+            random=digits_of(worst_errors[0][0]),
             searched=digits_of(largest),
             samples=len(sampled),
             state={name: state[name].tolist() for name in quantity.arguments},
@@ -201,7 +203,7 @@ class DigitCount:
         self.bits = max(self.bits, truth.bits)
         return truth
 
-    def judged(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+    def error_at(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
         """Return the error at a state, against balls."""
         copies = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
         answer = evaluate(implementation.engine, quantity, copies)[0]

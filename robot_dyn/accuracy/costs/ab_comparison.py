@@ -42,13 +42,13 @@ class ABComparison:
 
     Attributes:
         group: Kind of comparison: "parts", "algorithms" or "machine code".
-        what: Name of the difference between the versions.
+        name: Name of the difference between the versions.
         per: Unit of work that instructions and times refer to.
         first, second: The two versions.
     """
 
     group: str
-    what: str
+    name: str
     per: str
     first: Version
     second: Version
@@ -105,7 +105,7 @@ def take_turns(
     for pair in pairs:
         for version in (pair.first, pair.second):
             if version.run is not None:
-                runs.setdefault(version.run, Timed(f"{pair.what}, {version.name}", version.run))
+                runs.setdefault(version.run, Timed(f"{pair.name}, {version.name}", version.run))
     try:
         failed: dict[str, object] = dict(timing.take_turns(runs.values(), repeats, budget))
         if budget.left <= 0:

@@ -29,7 +29,7 @@ from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
 _MAX_REPEATS = 1000
-_PAIR_COLUMNS = ("group", "what", "per", "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s")
+_PAIR_COLUMNS = ("group", "name", "per", "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s")
 _VERSION_COLUMNS = ("name", "instructions", "time_s", "repeats", "repeatable")
 
 
@@ -65,19 +65,19 @@ class Cost(Result):
     def tables(self) -> Iterator[Block]:
         """A line for each comparison, grouped by unit of work, and notes."""
         yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
-        headings = ("per", "what", "first / second", "instructions", "ratio", "time", "ratio")
+        headings = ("per", "difference", "first / second", "instructions", "ratio", "time", "ratio")
         yield Table(headings, tuple(map(tuple, cost_rows(self))), right=headings[3:])
         yield "instructions are exact; times are the least processor times over turns, in machine code on one thread;"
         yield "± half the interquartile range of the ratios within a turn; ~ a time that varied by over 5 %"
 
-    def of(self, what: str) -> ABComparison:
+    def comparison(self, name: str) -> ABComparison:
         """Return the comparison with a name, for example "gravity" or "forward dynamics".
 
         Raises:
             QueryError: If there is no such comparison.
         """
-        pairs = {pair.what: pair for pair in self.alternatives}
-        return pairs[choice("cost of", what, pairs)]
+        pairs = {pair.name: pair for pair in self.alternatives}
+        return pairs[choice("cost of", name, pairs)]
 
     @property
     def rows(self) -> Iterator[Mapping[str, object]]:
@@ -91,12 +91,12 @@ class Cost(Result):
     @reported
     def parts(self) -> dict[str, int]:
         """Instructions that each part of the setup adds to a step with all others, by name."""
-        pairs = (pair for pair in self.alternatives if pair.group == "parts" and pair.what != step_cost.EVERYTHING)
-        return {pair.what: pair.added for pair in pairs}
+        pairs = (pair for pair in self.alternatives if pair.group == "parts" and pair.name != step_cost.EVERYTHING)
+        return {pair.name: pair.added for pair in pairs}
 
     @property
     def _everything(self) -> ABComparison | None:
-        return next((pair for pair in self.alternatives if pair.what == step_cost.EVERYTHING), None)
+        return next((pair for pair in self.alternatives if pair.name == step_cost.EVERYTHING), None)
 
     @reported
     def shared(self) -> int:
@@ -118,7 +118,7 @@ class Cost(Result):
 
 
 def cost(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -133,8 +133,8 @@ def cost(
     so that other programs on the machine matter little.
 
     Args:
-        what: A setup, or a plant or robot with a start.
-        q0: Initial position, (n,), in [rad] or [m]; required unless `what` is a setup.
+        system: A setup, or a plant or robot with a start.
+        q0: Initial position, (n,), in [rad] or [m]; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         controller: Controller, see `Setup`; by default that of the setup, or none.
         budget_s: Time budget, compiling not included, in [s].
@@ -145,7 +145,7 @@ def cost(
         QueryError: If an argument is invalid.
     """
     options = starts(q0, v0) | ({} if controller is None else {"controller": controller})
-    setup = setup_of("cost", what, options)
+    setup = setup_of("cost", system, options)
     integer("repeats", repeats, least=1, most=_MAX_REPEATS)
     budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, task)"))
     pairs, left_out = list[ABComparison](), list[str]()
@@ -186,7 +186,7 @@ def cost_rows(result: Cost) -> Iterator[list[str]]:
             ratio = f"{pair.time_ratio:.2f} ± {pair.time_ratio_spread:.2f}{', within noise' * pair.within_noise}"
         names, counts = f"{first.name} / {second.name}", f"{first.instructions} / {second.instructions}"
         count_ratio, times = number_or_dash(pair.instructions_ratio, 3), f"{_time(first)} / {_time(second)}"
-        yield ["" if is_repeated else pair.per, pair.what, names, counts, count_ratio, times, ratio]
+        yield ["" if is_repeated else pair.per, pair.name, names, counts, count_ratio, times, ratio]
 
 
 def _time(version: Version) -> str:

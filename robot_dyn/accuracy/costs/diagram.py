@@ -56,13 +56,13 @@ def _parts(result: Cost) -> list[tuple[str, int, str]]:
     """Return the parts of a step: names, instructions, and times as text."""
     rows = []
     for pair in result.alternatives:
-        if pair.group == "parts" and pair.what == EVERYTHING:
+        if pair.group == "parts" and pair.name == EVERYTHING:
             rows.append(
                 ("rigid bodies", pair.second.instructions, _time(pair.second.time_s if pair.second.times else None))
             )
         elif pair.group == "parts":
             time = ", within noise" if pair.within_noise else _time(pair.time_between_s)
-            rows.append((pair.what, pair.added, time))
+            rows.append((pair.name, pair.added, time))
     return rows + ([("shared by several", result.shared, "")] if result.shared else [])
 
 
@@ -99,7 +99,7 @@ def _draw_ratios(axes: Axes, others: list[ABComparison], colours: Colours) -> No
             if np.isfinite(x):
                 axes.text(max(x, 1), y, f" {x:.2g}", va="center", fontsize=8, **ink(colours))
     axes.axvline(1, color=colours["ink"], linewidth=0.9)
-    _label_rows(axes, [f"{pair.what}:\n{pair.first.name} / {pair.second.name}" for pair in others], colours)
+    _label_rows(axes, [f"{pair.name}:\n{pair.first.name} / {pair.second.name}" for pair in others], colours)
     smallest, largest = (np.nanmin(ratios, initial=1.0), np.nanmax(ratios, initial=2.0))
     axes.set_xlim(min(0.7, smallest / 1.2), 1.6 * largest)
 

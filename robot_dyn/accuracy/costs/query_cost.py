@@ -65,7 +65,7 @@ class QueryCost:
 
         Such a function raises QueryError if the comparison is not possible on this arm.
         """
-        for group, what, versions in (
+        for group, name, versions in (
             ("algorithms", "Coriolis matrix", self._coriolis_matrix),
             ("algorithms", "forward dynamics", self._forward_dynamics),
             ("algorithms", "C(q, v) v in forward dynamics", self._coriolis_torque),
@@ -73,7 +73,7 @@ class QueryCost:
             ("machine code", "right angles of the file", self._right_angles),
             ("machine code", "numbers of forward dynamics", self._floats),
         ):
-            yield what, lambda group=group, what=what, make=versions: ABComparison(group, what, PER_STATE, *make())
+            yield name, lambda group=group, name=name, make=versions: ABComparison(group, name, PER_STATE, *make())
 
     def _coriolis_matrix(self) -> tuple[Version, Version]:
         full, product = (self._quantity(name) for name in ("C", "coriolis_torque"))
@@ -105,7 +105,7 @@ class QueryCost:
 
     def _right_angles(self) -> tuple[Version, Version]:
         if not completed(self.robot)[1]:
-            raise QueryError("the file states none with too few digits")
+            raise QueryError("the file states all of them to full precision")
         stated = program_of(Trace(self.robot).quantity(_FORWARD).function)
         return self._version("as stated", stated), self._version("exact", self._best[1])
 

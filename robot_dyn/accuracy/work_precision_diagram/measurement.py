@@ -22,8 +22,8 @@ from robot_dyn.report.time_budget import Budget, OvertimeError
 from robot_dyn.report.timing import Timed, take_turns
 
 _RUN_FRACTION = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # fraction of the budget for one run
-_RESERVE = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, kept for repeats when new runs start
-_INTERPRETED_RESERVE = 0.05  # of the budget, kept for repeats of interpreted runs while the others are repeated
+_RESERVE = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # fraction of the budget kept for repeats when new runs start
+_INTERPRETED_RESERVE = 0.05  # fraction of the budget kept for interpreted runs while the others are repeated
 _MAX_LATE = 3  # runs of a ladder that may exceed their time limit
 _HARD = 4.0  # time limit of a run, over its planned time
 

@@ -48,7 +48,7 @@ _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # steps per record period in runs that load machine code
 _UNKNOWN = 15  # order assumed for a method that chooses its own
 ATOL = 1e-2  # absolute tolerance over the relative one, as in `Adaptive`
-ORDERS = {"DOP853": 8, "Rodas5P": 5}  # of methods that choose their steps
+ORDERS = {"DOP853": 8, "Rodas5P": 5}  # orders of methods that choose their steps
 
 
 @final
@@ -247,10 +247,10 @@ def _record_period(setup: Setup, duration_s: float) -> float:
     return float(parts) / ceil(RECORDS * float(parts) / duration_s)
 
 
-def common(t: np.ndarray, of: np.ndarray) -> np.ndarray:
+def common(t: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Return the index of each time t in the ascending times `of`; −1 for a time that is not among them."""
-    place = np.clip(np.searchsorted(of, t - _ON_TIME * of[-1] / len(of)), 0, len(of) - 1)
-    return np.where(np.abs(of[place] - t) <= _ON_TIME * of[-1], place, -1)
+    place = np.clip(np.searchsorted(times, t - _ON_TIME * times[-1] / len(times)), 0, len(times) - 1)
+    return np.where(np.abs(times[place] - t) <= _ON_TIME * times[-1], place, -1)
 
 
 def switches(setup: Setup) -> bool:

@@ -127,7 +127,8 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
         parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
         if end < _MIN_HORIZON * requested:
             raise HorizonError(
-                f"{first} and {other.description} part within {_MIN_HORIZON:g} of the duration, at t = {end:.2g} s: no"
+                f"{first} and {other.description} diverge from each other within {_MIN_HORIZON:g} of the"
+                f" duration, at t = {end:.2g} s: no"
                 " error can be measured; use a shorter run, or a less sensitive start"
             )
         setup = replace(setup, duration_s=end, record_every_s=0.0)

@@ -105,8 +105,8 @@ class WorkPrecision(Result):
         if reference.parted_s is not None:
             lost = "" if reference.lost_s is None else f", and differ by 0.1 at {reference.lost_s:.3g} s"
             yield (
-                f"horizon: {reference.horizon_s:g} s of {self.duration_s:g} s: beyond it, runs at tight tolerances part"
-                f" from each other{lost}"
+                f"horizon: {reference.horizon_s:g} s of {self.duration_s:g} s: beyond it, runs at tight tolerances"
+                f" diverge from each other{lost}"
             )
 
     def tables(self) -> Iterator[Block]:
@@ -119,7 +119,15 @@ class WorkPrecision(Result):
 
     def _table_of_ladders(self, columns: list[int]) -> Table:
         """Return a row for each method: orders, time for a number of digits, and the finest run."""
-        headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
+        headings = (
+            "method",
+            "order",
+            "measured",
+            *(f"{digits} digits" for digits in columns),
+            "least error",
+            "steps",
+            "in",
+        )
         best = {digits: min((p.value for _, p in self.digits(10.0**-digits)), default=0.0) for digits in columns}
         rows = []
         for ladder in self.ladders:
@@ -132,7 +140,8 @@ class WorkPrecision(Result):
             is_resolved = finest.error > self.reference.error
             error = number_or_dash(finest.error, 2) if is_resolved else f"< {self.reference.error:.0e}"
             orders = ["—" if order is None else f"{order:.2g}" for order in (ladder.order, ladder.measured_order)]
-            rows.append((ladder.name, *orders, *cells, error, format_duration(finest.time_s)))
+            steps = "—" if finest.steps is None else str(finest.steps)
+            rows.append((ladder.name, *orders, *cells, error, steps, format_duration(finest.time_s)))
         return Table(headings, tuple(rows), right=headings[1:])
 
     def _beyond_horizon(self) -> Iterator[Block]:
@@ -218,7 +227,7 @@ class WorkPrecision(Result):
 
 
 def work_precision(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -236,8 +245,8 @@ def work_precision(
     used; "auto" means both engines.
 
     Args:
-        what: A setup, or a plant or robot with a start.
-        q0: Initial position, (n,), in [rad] or [m]; required unless `what` is a setup.
+        system: A setup, or a plant or robot with a start.
+        q0: Initial position, (n,), in [rad] or [m]; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         duration_s: Duration, in [s]; by default that of the setup, or 1. Chaotic motion is cut earlier.
         controller: Controller, see `Setup`; by default that of the setup, or none.
@@ -252,7 +261,7 @@ def work_precision(
         HorizonError: If the motion has no reference solution.
     """
     options = {"duration_s": duration_s, "controller": controller}
-    setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in options.items() if x is not None})
+    setup = setup_of("work_precision", system, starts(q0, v0) | {k: x for k, x in options.items() if x is not None})
     if methods is None:
         methods = [*_FIRST, *(name for name in METHODS if name not in (*_FIRST, AUTO))]
     instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'RK4']")

@@ -19,7 +19,7 @@ _DURATION_S = 1.0
 
 @command(VERIFICATION)
 def work_precision(
-    what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    source: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     /,
     budget: Budget = 30.0,
     repeats: Repeats = 25,
@@ -31,20 +31,20 @@ def work_precision(
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
-    """Show what each digit of a motion costs in time.
+    """Measure computing time against accuracy, by method and program.
 
-    Results are listed by method and program. Ctrl-C ends it and keeps its runs.
+    The table lists the time for a number of correct digits. Ctrl-C ends the measurement and keeps finished runs.
 
     Options:
-        what (SCENE.toml|ROBOT): A scene file, or a robot for a free swing.
+        source (SCENE.toml|ROBOT): A scene file, or a robot for a free swing.
         method (METHOD): Only this method; may be repeated; all by default.
         peers: Also run other installed programs that can simulate the motion.
         q: Start of a robot, in the form of `query --q`; random by default.
         v: Velocities at the start; 0 by default.
         duration (SECONDS): Duration of the robot's motion; 1 by default.
     """
-    paths = results.files(rd.accuracy.WorkPrecision, what)
-    setup = _setup(what, q, v, duration, options)
+    paths = results.files(rd.accuracy.WorkPrecision, source)
+    setup = _setup(source, q, v, duration, options)
     with bar(budget, "starting") as spent:
         result = rd.accuracy.work_precision(
             setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
@@ -54,9 +54,9 @@ def work_precision(
 
 @command(DYNAMICS)
 def cost(scene: Scene, /, budget: Budget = 10.0, repeats: Repeats = 25, results: Results = PRINTED) -> None:
-    """Count and time what effects, control and terms cost.
+    """Count instructions and time of effects, control and terms.
 
-    Each is switched on and off; algorithms are compared with each other.
+    Each part of a time step is switched on and off, and alternative algorithms are compared.
     """
     paths = results.files(rd.accuracy.Cost, scene)
     setup = rd.read_scene(scene)
@@ -86,7 +86,7 @@ def certify(
     Options:
         samples: Number of random states.
         seed: Seed of the random states.
-        repeats: How often each query is timed.
+        repeats: Number of timings of each query.
         q: Positions of a state to certify as well, in the form of `query --q`.
         v: Velocities of this state; 0 by default.
         a: Accelerations of this state, for inverse dynamics; 0 by default.
@@ -115,13 +115,13 @@ def advise(scene: Scene, /, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
-def _setup(what: str, q: str | None, v: str | None, duration: float | None, options: RobotOptions) -> rd.Setup:
+def _setup(source: str, q: str | None, v: str | None, duration: float | None, options: RobotOptions) -> rd.Setup:
     """The setup of a scene file, or of the free swing of a robot."""
-    if setup := arguments.scene(what, {"--q": q, "--v": v, "--duration": duration} | options.stated):
+    if setup := arguments.scene(source, {"--q": q, "--v": v, "--duration": duration} | options.stated):
         return setup
     import numpy as np
 
-    robot = options.load(what)
+    robot = options.load(source)
     names = robot.joint_names
     start: Any = (
         robot.random_configuration(np.random.default_rng(0)) if q is None else arguments.vector("--q", q, names)

@@ -1,4 +1,4 @@
-"""The demo: an arm loaded, compared, simulated, shown, and what digits of its motion take."""
+"""The demo: load, compare, simulate and show an arm, and measure the cost of accuracy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.files import save, target
 
 _ERROR, _METHOD = 1e-8, "DOP853"  # [rad]
-_BUDGET_S = 8.0  # compiling not counted, which happens once for a version of the library
+_BUDGET_S = 8.0  # without compiling, which happens once for a version of the library
 
 
 @command(INSPECTION)

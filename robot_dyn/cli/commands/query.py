@@ -46,7 +46,7 @@ def info(robot: Name, /, compiled: bool = False, options: RobotOptions = AS_STAT
 
 @command(DYNAMICS)
 def query(
-    what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    source: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     /,
     q: Positions = None,
     v: str | None = None,
@@ -66,7 +66,7 @@ def query(
     are listed.
 
     Options:
-        what (ROBOT|SCENE.toml): A robot; or a scene file, with its robot, effects and start.
+        source (ROBOT|SCENE.toml): A robot; or a scene file, with its robot, effects and start.
         v: Velocities in rad/s or m/s, in the same form.
         a: Accelerations in rad/s² or m/s²: the torque is computed.
         tau: Torques in N m or N: the acceleration is computed.
@@ -80,10 +80,10 @@ def query(
     from robot_dyn.foundations.result import plain
 
     if a is not None and tau is not None:
-        raise QueryError("give --a or --tau, not both: one follows from the other")
-    setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.stated)
+        raise QueryError("give --a or --tau, not both: each determines the other")
+    setup = arguments.scene(source, {"--effects": effects, "--payload": payload} | options.stated)
     if setup is None:
-        robot = options.load(what)
+        robot = options.load(source)
         robot = robot.with_(payload=[arguments.payload(text) for text in payload]) if payload else robot
         plant = rd.Plant(robot, effects or ())
     else:

@@ -74,7 +74,7 @@ def _group(
         prefetch(vectors, array, at, n, False)
     prefetch(vectors, y, at, len(program.outputs), True)
     columns = [loaded(vectors, array, at, n) for array, n in varying]
-    rows = [[vectors.of([x] * vectors.count) for x in numbers(vectors.builder, *pair)] for pair in alike]
+    rows = [[vectors.packed([x] * vectors.count) for x in numbers(vectors.builder, *pair)] for pair in alike]
     written = writer.write(program, [*columns, *rows])
     store(vectors, y, at, written.results)
     arguments = vectors.absolute_sum((x for column in columns for x in column), before[0])

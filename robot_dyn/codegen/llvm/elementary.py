@@ -78,7 +78,7 @@ def _signed(x: Lanes, turns: Lanes, narrow: bool) -> Lanes:
     """Return x, or −x where the second bit of `turns` is set."""
     if narrow:
         builder = turns.vectors.builder
-        return (x * -1.0).choose(builder.icmp_signed("!=", (turns & 2).value, turns.of(0)), x)
+        return (x * -1.0).choose(builder.icmp_signed("!=", (turns & 2).value, turns.operand(0)), x)
     return (x.cast("bitcast", I64) ^ ((turns & 2) << 62)).cast("bitcast", F64)
 
 
@@ -99,7 +99,7 @@ def tanh(x: Lanes) -> Lanes:
     x = x.cast("fpext", F64) if narrow else x
     negative = x.below(0.0)
     size = (x * -1.0).choose(negative, x)
-    top = x.like(x.of(_LARGE))
+    top = x.like(x.operand(_LARGE))
     size = top.choose(top.below(size), size)  # NaN is preserved
     z = size * size
     near = size + size * z * (polynomial(z, _P) / polynomial(z, _Q))

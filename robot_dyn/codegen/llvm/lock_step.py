@@ -211,4 +211,4 @@ def _place(vectors: Vectors, array: ir.Value, k: int, runs: int, at: ir.Value) -
 
 def _spread(vectors: Vectors, x: ir.Value) -> ir.Value:
     """Return a vector with a number in each lane."""
-    return vectors.of([x] * vectors.count) if vectors.count > 1 else x
+    return vectors.packed([x] * vectors.count) if vectors.count > 1 else x

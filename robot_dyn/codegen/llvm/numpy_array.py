@@ -26,7 +26,7 @@ def field(builder: ir.IRBuilder, view: ir.Value, name: str) -> ir.Value:
 
 
 def is_array(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
-    """Return whether the class of an object is `numpy.ndarray`, not a subclass."""
+    """Return True if the class of an object is `numpy.ndarray`, not a subclass."""
     kind = api(builder, "PyObject_Type", value)
     api(builder, "Py_DecRef", kind)  # the object still references it
     ndarray = builder.module.globals.get(NDARRAY) or ir.GlobalVariable(builder.module, ir.IntType(8), NDARRAY)
@@ -40,7 +40,7 @@ def acquired(builder: ir.IRBuilder, value: ir.Value, view: ir.Value, request: in
 
 
 def has_form(builder: ir.IRBuilder, view: ir.Value, kind: ir.Type, axes: int) -> ir.Value:
-    """Return whether a view contains aligned numbers of `kind` in native byte order, along `axes` axes."""
+    """Return True if a view contains aligned numbers of `kind` in native byte order, along `axes` axes."""
     conditions = [builder.icmp_signed("==", field(builder, view, "axes"), ir.Constant(I32, axes))]
     text = field(builder, view, "format")
     for i, letter in enumerate(b"d\0" if kind is F64 else b"f\0"):
@@ -52,7 +52,7 @@ def has_form(builder: ir.IRBuilder, view: ir.Value, kind: ir.Type, axes: int) ->
 
 
 def has_lengths(builder: ir.IRBuilder, view: ir.Value, expected: Sequence[ir.Value]) -> ir.Value:
-    """Return whether a view of len(expected) axes has these lengths."""
+    """Return True if a view of len(expected) axes has these lengths."""
     lengths, conditions = field(builder, view, "lengths"), []
     for axis, length in enumerate(expected):
         actual = builder.load(builder.gep(lengths, [ir.Constant(I64, axis)]))
@@ -61,7 +61,7 @@ def has_lengths(builder: ir.IRBuilder, view: ir.Value, expected: Sequence[ir.Val
 
 
 def all_of(builder: ir.IRBuilder, conditions: Sequence[ir.Value]) -> ir.Value:
-    """Return whether all conditions hold."""
+    """Return True if all conditions hold."""
     result = ir.Constant(I1, 1)
     for condition in conditions:
         result = builder.and_(result, condition)

@@ -82,7 +82,7 @@ class Vectors:
         """Return one number of a vector."""
         return vector if self.count == 1 else self.builder.extract_element(vector, ir.Constant(I32, i))
 
-    def of(self, numbers: Iterable[ir.Value]) -> ir.Value:
+    def packed(self, numbers: Iterable[ir.Value]) -> ir.Value:
         """Return the vector of these numbers, padded with zeros."""
         result = self.constant(0.0)
         for i, x in enumerate(numbers):
@@ -125,7 +125,7 @@ def _operator(instruction: str, *flags: str, reflected: bool = False) -> Callabl
 
     def operator(self: Lanes, other: Lanes | float) -> Lanes:
         """Apply the instruction to two vectors, lane by lane."""
-        x, y = self.value, self.of(other)
+        x, y = self.value, self.operand(other)
         return self.like(getattr(self.vectors.builder, instruction)(*((y, x) if reflected else (x, y)), flags=flags))
 
     return operator
@@ -151,9 +151,9 @@ class Lanes:
     __rsub__ = _operator("fsub", "contract", reflected=True)
     __truediv__ = _operator("fdiv", "contract")
     __rtruediv__ = _operator("fdiv", "contract", reflected=True)
-    plus, __and__, __lshift__, __xor__ = map(_operator, ("add", "and_", "shl", "xor"))  # of integers
+    plus, __and__, __lshift__, __xor__ = map(_operator, ("add", "and_", "shl", "xor"))  # operations on integers
 
-    def of(self, x: Lanes | float) -> ir.Value:
+    def operand(self, x: Lanes | float) -> ir.Value:
         """Return a constant, or other lanes, as an LLVM value of this type."""
         return x.value if isinstance(x, Lanes) else self.vectors.constant(x)
 
@@ -168,11 +168,11 @@ class Lanes:
 
     def below(self, other: Lanes | float) -> ir.Value:
         """Return the mask of lanes that are less than the other."""
-        return self.vectors.builder.fcmp_ordered("<", self.value, self.of(other))
+        return self.vectors.builder.fcmp_ordered("<", self.value, self.operand(other))
 
     def choose(self, mask: ir.Value, other: Lanes | float) -> Lanes:
         """Return this value where the mask is true, otherwise the other."""
-        return self.like(self.vectors.builder.select(mask, self.value, self.of(other)))
+        return self.like(self.vectors.builder.select(mask, self.value, self.operand(other)))
 
 
 def polynomial(z: Lanes, coefficients: tuple[float, ...]) -> Lanes:

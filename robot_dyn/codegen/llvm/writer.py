@@ -78,7 +78,7 @@ class Writer:
         """Write sines and cosines, several angles of one state in one vector; return the mask of far angles."""
         together = Vectors(self.builder, self.kind, self.count if len(ops) == 1 else GROUP)
         angles = [values[op.operands[0]] for op in ops]
-        vector = angles[0] if len(ops) == 1 else together.of(angles)
+        vector = angles[0] if len(ops) == 1 else together.packed(angles)
         both = sincos(Lanes(together, vector))
         for i, op in enumerate(ops):
             parts = [half.value if len(ops) == 1 else together.lane(half.value, i) for half in both]

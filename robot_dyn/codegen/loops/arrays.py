@@ -31,7 +31,7 @@ def store_at(f: Function, x: ArrayValue, node: ast.Subscript, value: Value) -> N
     """Write an entry, or one number into all entries of a view."""
     if x.kind.frozen:
         raise f.refused(node, "a write into a read-only array", "pass a writable one")
-    places, converted_value = _places(f, x, node), converted(f, scalar(f, value, node), x.kind.of, node)
+    places, converted_value = _places(f, x, node), converted(f, scalar(f, value, node), x.kind.number, node)
     if all(isinstance(place, Scalar) for place in places):
         store(f, x, [place for place in places if isinstance(place, Scalar)], converted_value)
     else:
@@ -49,7 +49,9 @@ def indices(f: Function, x: ArrayValue, node: ast.Subscript) -> list[Scalar]:
 def load(f: Function, x: ArrayValue, indices: list[Scalar]) -> Scalar:
     """Load an entry."""
     value = f.builder.load(address(f, x, indices))
-    return Scalar(x.kind.of, f.builder.icmp_unsigned("!=", value, ir.Constant(I8, 0)) if x.kind.of == BOOL else value)
+    return Scalar(
+        x.kind.number, f.builder.icmp_unsigned("!=", value, ir.Constant(I8, 0)) if x.kind.number == BOOL else value
+    )
 
 
 def store(f: Function, x: ArrayValue, indices: list[Scalar], value: Scalar) -> None:

@@ -100,7 +100,7 @@ class MachineFunction:
         began, types = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
             if types not in self._entries:
-                with log_if_slow(f"compiling {self.about}, once for this version"):
+                with log_if_slow(f"compiling {self.about} (cached for this version)"):
                     self._entries[types] = self._compiled(types)
             self._entries[place] = self._entries[types]
         COMPILING.seconds += perf_counter() - began
@@ -122,7 +122,7 @@ class MachineFunction:
         key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
         call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
         if store is not None and store.load(note) is None:
-            store.save(note, b"", f"{self.about} is stored")
+            store.save(note, b"", f"{self.about}, marker")
         text = ctypes.CFUNCTYPE(ctypes.c_char_p)(result)().decode()
         return _ENTRY(call), _read(text)
 
@@ -146,7 +146,11 @@ class Call:
         """Return the result of the function for these arguments."""
         before = self._given
         if len(before) != len(arguments):
-            self._given, self._packed, self._kinds = [None] * len(arguments), {}, [Static.of(None)] * len(arguments)
+            self._given, self._packed, self._kinds = (
+                [None] * len(arguments),
+                {},
+                [Static.from_value(None)] * len(arguments),
+            )
             self._block = array("q", bytes(8 * len(arguments)))
             self._take(tuple(range(len(arguments))), arguments)
         else:
@@ -191,5 +195,5 @@ def _read(text: str) -> Kind:
             items = stack.pop()
             stack[-1].append(TupleKind(tuple(items)))
         else:
-            stack[-1].append(_NUMBERS.get(letter, Static.of(None)))
+            stack[-1].append(_NUMBERS.get(letter, Static.from_value(None)))
     return stack[0][0]

@@ -69,8 +69,8 @@ class Function:
         self.globals = names_of(function)
         self._times = Counter(self.arguments.keys()) + stores(self.tree)
         self._kinds: dict[str, Kind] = dict(self.arguments)
-        self._values: dict[str, Value] = {}  # of names assigned at one place
-        self._slots: dict[str, list[ir.Value]] = {}  # of other names
+        self._values: dict[str, Value] = {}  # values of names assigned at one place
+        self._slots: dict[str, list[ir.Value]] = {}  # memory of other names
         self.assigned: set[str] = set()
         self.result: Kind | None = None
         self.may_fail = False
@@ -135,7 +135,7 @@ class Function:
             value, values = of_leaves(kind, values[:count]), values[count:]
             self._bind(name, self.fitted(value, self._kinds[name], self.tree))
         if not statements.block(self, self.tree.body):
-            if self.result not in (None, Static.of(None)):
+            if self.result not in (None, Static.from_value(None)):
                 raise self.refused(self.tree, "a function that ends without its result", "end it with a return")
             self.give(StaticValue(None), self.tree)
         self._end_failure()
@@ -172,9 +172,9 @@ class Function:
             return x
         if isinstance(x, Number) and isinstance(y, Number):
             kind = joined(x, y)
-        elif isinstance(x, ArrayKind) and isinstance(y, ArrayKind) and (x.of, x.ndim) == (y.of, y.ndim):
+        elif isinstance(x, ArrayKind) and isinstance(y, ArrayKind) and (x.number, x.ndim) == (y.number, y.ndim):
             both = x.contiguous and y.contiguous, x.single and y.single, x.frozen or y.frozen
-            kind = ArrayKind(x.of, x.ndim, *both)
+            kind = ArrayKind(x.number, x.ndim, *both)
         elif isinstance(x, TupleKind) and isinstance(y, TupleKind) and len(x.items) == len(y.items):
             pairs = zip(x.items, y.items, strict=True)
             kind = TupleKind(tuple(self.common(a, b, node) for a, b in pairs))
@@ -292,4 +292,4 @@ def _llvm_result(kind: Kind, may_fail: bool) -> ir.Type:
 
 
 def _or_none(kind: Kind | None) -> Kind:
-    return Static.of(None) if kind is None else kind
+    return Static.from_value(None) if kind is None else kind

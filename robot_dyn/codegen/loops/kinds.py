@@ -46,14 +46,14 @@ class ArrayKind:
     """An array.
 
     Attributes:
-        of: Type of its numbers.
+        number: Type of its numbers.
         ndim: Number of axes.
         contiguous: True if contiguous in C order; otherwise strides are determined at run time.
         single: True if the last of several axes has length 1 at compile time, for example for a single run.
         frozen: True if read-only.
     """
 
-    of: Number
+    number: Number
     ndim: int
     contiguous: bool = True
     single: bool = False
@@ -111,7 +111,7 @@ class Static:
     token: str
 
     @staticmethod
-    def of(value: object) -> Static:
+    def from_value(value: object) -> Static:
         """Return the type of a value."""
         return Static(value, f"{id(value)}" if callable(value) else repr(value))
 
@@ -150,7 +150,7 @@ def kind_of(value: object) -> Kind:
         if isinstance(value, of):
             return number
     if value is None:
-        return Static.of(value)
+        return Static.from_value(value)
     raise TraceError(
         f"machine code supports numbers, arrays and named tuples of them, got a {type(value).__name__}; convert it"
     )

@@ -81,26 +81,28 @@ def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, 
     return converted(f, x, kind, node), converted(f, y, kind, node)
 
 
-def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+def binary(f: Function, operation: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     """Return the result of an operation on two numbers."""
     if x.const is not None and y.const is not None and UINT not in (x.kind, y.kind):
-        return _of_constants(f, of, x.const, y.const, node)
-    if of in _BITS and x.kind == y.kind and x.kind != FLOAT:
-        return Scalar(x.kind, getattr(f.builder, _BITS[of])(x.ir, y.ir))
+        return _of_constants(f, operation, x.const, y.const, node)
+    if operation in _BITS and x.kind == y.kind and x.kind != FLOAT:
+        return Scalar(x.kind, getattr(f.builder, _BITS[operation])(x.ir, y.ir))
     if x.kind == y.kind == BOOL:
         raise f.refused(node, "arithmetic of two truth values", "convert them with int, or write and, or")
-    if of is ast.Pow:
+    if operation is ast.Pow:
         return _power(f, x, y, node)
-    if of is ast.Div and UINT not in (x.kind, y.kind):
+    if operation is ast.Div and UINT not in (x.kind, y.kind):
         x, y = converted(f, x, FLOAT, node), converted(f, y, FLOAT, node)
     x, y = together(f, x, y, node)
-    if x.kind == FLOAT and of in _FLOATING:
-        return Scalar(FLOAT, getattr(f.builder, _FLOATING[of])(x.ir, y.ir))
+    if x.kind == FLOAT and operation in _FLOATING:
+        return Scalar(FLOAT, getattr(f.builder, _FLOATING[operation])(x.ir, y.ir))
     if x.kind == INT:
-        return _of_integers(f, of, x, y, node)
-    if x.kind == UINT and (of in _PLAIN or of in (ast.LShift, ast.RShift)):
-        return _of_words(f, of, x, y)
-    raise f.refused(node, f"{of.__name__} of numbers of type {x.kind.name}", "convert them, or write it differently")
+        return _of_integers(f, operation, x, y, node)
+    if x.kind == UINT and (operation in _PLAIN or operation in (ast.LShift, ast.RShift)):
+        return _of_words(f, operation, x, y)
+    raise f.refused(
+        node, f"{operation.__name__} of numbers of type {x.kind.name}", "convert them, or write it differently"
+    )
 
 
 def _of_constants(f: Function, of: type[ast.operator], x: float, y: float, node: ast.AST) -> Scalar:
@@ -159,11 +161,11 @@ def _power(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     return Scalar(FLOAT, f.builder.call(f.external("pow", F64, F64, F64), [x.ir, converted(f, y, FLOAT, node).ir]))
 
 
-def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+def compared(f: Function, relation: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     """Return a relation of two numbers; with nan only != holds."""
-    if of not in _RELATIONS:
-        raise f.refused(node, f"the relation {of.__name__}", "compare numbers with ==, !=, <, <=, > or >=")
-    sign = _RELATIONS[of]
+    if relation not in _RELATIONS:
+        raise f.refused(node, f"the relation {relation.__name__}", "compare numbers with ==, !=, <, <=, > or >=")
+    sign = _RELATIONS[relation]
     x, y = together(f, x, y, node)
     b = f.builder
     if x.kind == FLOAT:
@@ -172,7 +174,7 @@ def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.A
 
 
 def truth(f: Function, x: Scalar) -> ir.Value:
-    """Return whether a number is not 0, as LLVM's I1."""
+    """Return True if a number is not 0, as LLVM's I1."""
     if x.kind == BOOL:
         return x.ir
     zero = ir.Constant(x.kind.llvm, 0)

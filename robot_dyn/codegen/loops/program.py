@@ -139,9 +139,9 @@ class Program:
             return Scalar(kind, (b.trunc if kind == BOOL else b.bitcast)(loaded[0], kind.llvm))
         n = kind.ndim
         lengths, apart = loaded[1 : 1 + n - kind.single], loaded[1 + n : 1 + 2 * n - kind.single]
-        bytes_ = ir.Constant(I64, 1 if kind.of == BOOL else 8)
+        bytes_ = ir.Constant(I64, 1 if kind.number == BOOL else 8)
         apart = [] if kind.contiguous else [b.sdiv(stride, bytes_, flags=("exact",)) for stride in apart]
-        return of_leaves(kind, [b.inttoptr(loaded[0], kind.of.stored.as_pointer()), *lengths, *apart])
+        return of_leaves(kind, [b.inttoptr(loaded[0], kind.number.stored.as_pointer()), *lengths, *apart])
 
     def invariant_load(self, b: Builder, pointer: ir.Value) -> ir.Value:
         """Load a value that does not change while machine code runs."""
@@ -190,10 +190,10 @@ class Program:
         kind = kind_of(x)
         assert isinstance(kind, ArrayKind)
         if id(x) not in self._arrays:
-            stored = ir.ArrayType(kind.of.stored, x.size)
-            entries = [entry if kind.of == FLOAT else int(entry) for entry in x.ravel().tolist()]
-            self._arrays[id(x)] = x, self._global(stored, entries).bitcast(kind.of.stored.as_pointer())
-        kind = ArrayKind(kind.of, kind.ndim, True, kind.single, True)
+            stored = ir.ArrayType(kind.number.stored, x.size)
+            entries = [entry if kind.number == FLOAT else int(entry) for entry in x.ravel().tolist()]
+            self._arrays[id(x)] = x, self._global(stored, entries).bitcast(kind.number.stored.as_pointer())
+        kind = ArrayKind(kind.number, kind.ndim, True, kind.single, True)
         return ArrayValue(kind, self._arrays[id(x)][1], tuple(number(length) for length in x.shape))
 
 

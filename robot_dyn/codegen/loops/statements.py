@@ -82,7 +82,7 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
     places = arrays.indices(f, array, target)
     x = arrays.load(f, array, places)
     new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
-    arrays.store(f, array, places, numbers.converted(f, new, array.kind.of, node))
+    arrays.store(f, array, places, numbers.converted(f, new, array.kind.number, node))
     return False
 
 

@@ -113,7 +113,7 @@ class StaticValue:
     @property
     def kind(self) -> Static:
         """Type of the value."""
-        return Static.of(self.value)
+        return Static.from_value(self.value)
 
 
 @final
@@ -155,7 +155,7 @@ def leaf_types(kind: Kind) -> list[ir.Type]:
         return [kind.llvm]
     if isinstance(kind, ArrayKind):
         axes = kind.ndim - kind.single
-        return [kind.of.stored.as_pointer(), *[I64] * (axes if kind.contiguous else 2 * axes)]
+        return [kind.number.stored.as_pointer(), *[I64] * (axes if kind.contiguous else 2 * axes)]
     if isinstance(kind, RecordKind):
         return [WORDS]
     return [] if isinstance(kind, Static) else [leaf for item in kind.items for leaf in leaf_types(item)]

@@ -26,7 +26,7 @@ def elementwise(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value
     check(f, node, to, operands)
     if f.silent:
         return
-    b, of = f.builder, to.kind.of
+    b, of = f.builder, to.kind.number
     for width, e in chunks(f, arrays.size(f, to), WIDTHS):
         values = [
             loaded(b, x.data, e, width, of) if isinstance(x, ArrayValue) else spread(b, x.ir, width, of)
@@ -41,7 +41,7 @@ def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> 
         if isinstance(x, ArrayValue):
             same = f.builder.icmp_signed("==", arrays.size(f, x).ir, arrays.size(f, to).ir)
             f.check(same, node, "arrays of a primitive have different sizes")
-            if not (x.kind.contiguous and to.kind.contiguous) or x.kind.of != to.kind.of:
+            if not (x.kind.contiguous and to.kind.contiguous) or x.kind.number != to.kind.number:
                 raise f.refused(
                     node, "a primitive of arrays that are not contiguous or differ in type", "copy them first"
                 )

@@ -1,4 +1,4 @@
-"""From the code of the library to a program: the formulations run on symbols.
+"""The trace: the formulations of the library run on symbols and become a program.
 
 origins, base_parameters    the same motion with fewer numbers: frames, inertias
 symbol, condition, symbolic    numbers of a trace, their comparisons, and both outcomes of a branch

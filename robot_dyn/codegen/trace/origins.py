@@ -58,5 +58,5 @@ def _best(body: Body, children: Sequence[Array]) -> tuple[Array, Array]:
 
 
 def _numbers(p: Iterable[Array]) -> int:
-    """Return how many entries are not zero."""
+    """Return the number of nonzero entries."""
     return sum(bool(x != 0) for x in p)

@@ -47,7 +47,7 @@ class SymbolicDynamics(Dynamics[Symbols]):
         """Arithmetic of all numbers."""
         return self._trace.arithmetic
 
-    def of(self, values: Mapping[str, Scalar]) -> SymbolicDynamics:
+    def with_parameters(self, values: Mapping[str, Scalar]) -> SymbolicDynamics:
         """Return a copy whose inputs have these values."""
         if not values:
             return self

@@ -1,4 +1,4 @@
-"""Trace: the library's formulations run on symbols, giving CasADi Functions; of each quantity the shortest is used.
+"""Trace: the library's formulations run on symbols, giving CasADi Functions; the shortest of each quantity is used.
 
 closed form        M = Σ Jᵢᵀ 𝓜ᵢ Jᵢ and the Christoffel symbols, as in `Lagrangian`
 recursion          Newton–Euler, composite body, articulated body
@@ -125,7 +125,7 @@ class Trace:
         return Traced(functions[least], least, counts)
 
     def _formulations(self, name: Key) -> Iterator[tuple[str, Callable[[], Node]]]:
-        """Return the formulations of a quantity; the closed form always if there is no other."""
+        """Return the formulations of a quantity; the closed form if there is no other."""
         if isinstance(name, tuple):  # queries of frames do not need inertias
             query, *frame = name
             arrays = [self.symbols[argument][1] for argument in keyed(name).arguments]

@@ -98,7 +98,7 @@ class Quantisation(Block):
     term = "y = Δ ⌊x/Δ + ½⌋"
     linear, rounds = False, True
 
-    resolution: CoefficientField = field(metadata=coefficient(SIGNAL, symbol="Δ", above=0))
+    resolution: CoefficientField = field(metadata=coefficient(SIGNAL, symbol="Δ", exclusive_minimum=0))
 
     def output(self, x: Array, s: Array, period_s: float) -> Array:
         return self.resolution * np.floor(x / self.resolution + 0.5)
@@ -117,7 +117,7 @@ class Noise(Block):
     term = "y = x + σ ξ"
     linear, rounds, random = False, False, True
 
-    deviation: CoefficientField = field(metadata=coefficient(SIGNAL, symbol="σ", least=0))
+    deviation: CoefficientField = field(metadata=coefficient(SIGNAL, symbol="σ", minimum=0))
 
     def state_size(self, n: int) -> int:
         return n
@@ -140,7 +140,7 @@ class RateLimit(Block):
     term = "y = y₋ + sat(x − y₋, r T)"
     linear, rounds = False, False
 
-    rate: CoefficientField = field(metadata=coefficient(f"{SIGNAL}/s", symbol="r", above=0))
+    rate: CoefficientField = field(metadata=coefficient(f"{SIGNAL}/s", symbol="r", exclusive_minimum=0))
 
     def state_size(self, n: int) -> int:
         return n

@@ -34,7 +34,7 @@ class LowPass(Block):
     term = "y = x through Butterworth's filter"
     rounds = False
 
-    cutoff_rad_s: CoefficientField = field(metadata=coefficient("rad/s", symbol="ω", above=0))
+    cutoff_rad_s: CoefficientField = field(metadata=coefficient("rad/s", symbol="ω", exclusive_minimum=0))
     order: int = 2
 
     def __post_init__(self) -> None:

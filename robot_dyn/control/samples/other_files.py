@@ -34,4 +34,4 @@ def refuse_other_files(path: str | Path, remedy: str) -> None:
     named = [kind for kind in _KINDS if kind.suffix == suffix]
     named += [kind for kind in _KINDS if kind.start and start.startswith(kind.start)]
     for kind in named[:1]:
-        raise PlanError(f"{path}: is {kind.name} ({kind.suffix}), which is not read; {_KINDS[kind]}")
+        raise PlanError(f"{path}: is {kind.name} ({kind.suffix}), which is not supported; {_KINDS[kind]}")

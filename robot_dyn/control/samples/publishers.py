@@ -13,6 +13,9 @@ _APART = 0.01  # [rad] or [m]: smallest distance of the two motions, far above t
 _BACK = 0.2  # times the step to the other motion: the largest distance of the samples before and after it
 _MOST = 0.8  # smallest fraction of fast steps that lead to the other motion or back
 _SPEED = np.pi  # [rad/s] or [m/s], for joints without a velocity limit
+_LAG = 2e-3  # [rad] or [m]: smallest step back of a delayed copy, above the resolution of encoders
+_BEND = 0.2  # times that step: the largest second difference within each motion, which noise exceeds
+_UNEVEN = 1.2  # ratio of alternate periods: clocks of two publishers are rarely half a period apart
 
 
 def refuse_alternating(table: Recorded) -> None:
@@ -28,7 +31,11 @@ def refuse_alternating(table: Recorded) -> None:
     to_or_back = np.pad(apart, ((0, 1), (0, 0))) | np.pad(apart, ((1, 0), (0, 0)))
     interleaved = apart.sum(axis=0) >= max(_FEW, _PART * len(steps))
     interleaved &= (fast & to_or_back).sum(axis=0) >= _MOST * fast.sum(axis=0)
-    for i in np.flatnonzero(interleaved & table.has_column)[:1]:
+    delayed = _delayed(table, fast)
+    copied = delayed.sum(axis=0) >= max(_FEW, _PART * len(steps))
+    copied &= delayed.sum(axis=0) >= _MOST * (np.abs(steps[2:-1]) > _LAG).sum(axis=0)
+    apart[1:-1] |= delayed & copied
+    for i in np.flatnonzero((interleaved | copied) & table.has_column)[:1]:
         k = int(apart[:, i].argmax())
         q, unit = table.q[k : k + 3, i], table.unit(int(i))
         raise PlanError(
@@ -36,3 +43,22 @@ def refuse_alternating(table: Recorded) -> None:
             f" {apart[:, i].sum()} of {len(table.t)} samples, first {q[0]:.4g}, {q[1]:.4g}, {q[2]:.4g} {unit} from"
             f" {table.t[k]:.6g} s; {TWO_PUBLISHERS}"
         )
+
+
+def _delayed(table: Recorded, fast: np.ndarray) -> np.ndarray:
+    """Return True where a sample belongs to a copy that is a few steps late, (m − 4, n), from the third on.
+
+    The joint steps back and further on, while every other sample continues one smooth motion. Vibration and way points
+    there and back do the same at even periods, so steps must exceed the limits, or periods alternate.
+    """
+    q, gaps = table.q, np.diff(table.t)
+    if len(q) < _FEW:
+        return np.zeros((max(len(q) - 4, 0), q.shape[1]), bool)
+    steps = np.diff(q, axis=0)
+    before, after = steps[1:-2], steps[2:-1]
+    size = np.minimum(np.abs(before), np.abs(after))
+    bend = np.abs(q[4:] - 2 * q[2:-2] + q[:-4])
+    odd, even = np.median(gaps[::2]), np.median(gaps[1::2])
+    uneven = max(odd, even) > _UNEVEN * min(odd, even)
+    returns = (before * after < 0) & (np.abs(before + after) >= _BACK * size)
+    return returns & (size > _LAG) & (bend < _BEND * size) & (uneven | fast[1:-2] | fast[2:-1])

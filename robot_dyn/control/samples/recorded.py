@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -94,7 +95,7 @@ def recorded(
     if joints is not None:
         instance("joints", joints, Mapping, "give the column of each joint, {joint: column}", error=PlanError)
     table = table_of(source, arm.joint_names, joints or {}, topic, time)
-    heads, t, has_time_unit = _times(table, time, least)
+    heads, t, has_time_unit = _times(table, time, least, str(source) if isinstance(source, str | Path) else "samples")
     at = _joints(arm, heads, joints)
     skipped = [head for head, column in heads.items() if head not in at.values() and is_text(column)]
     note = "; ".join([table.note] * bool(table.note) + [f"without the texts of {shown(skipped)}"] * bool(skipped))
@@ -124,13 +125,15 @@ def _rests(arm: Robot, q0: JointValues) -> np.ndarray:
     return numbers("q0", in_order("q0", q0, arm.joint_names, error=PlanError), (arm.n,), error=PlanError)
 
 
-def _times(table: Table, time: ArrayLike | None, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
+def _times(
+    table: Table, time: ArrayLike | None, least: int, where: str
+) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
     """Return the other columns, the times in [s], and True if their unit is known."""
     heads, stated = table.columns, True
     lengths = {len(x) if x.ndim == 1 else 0 for x in heads.values()}
     if len(lengths) != 1 or max(lengths) < least:
         counts = ", ".join(f"{shown(head)} {len(x) if x.ndim else 'no'}" for head, x in list(heads.items())[:4])
-        raise PlanError(f"samples: columns must have equal lengths of at least {least}; got {counts or 'none'}")
+        raise PlanError(f"{where}: columns must have equal lengths of at least {least}; got {counts or 'none'}")
     (m,) = lengths
     if table.t is not None:
         t = table.t

@@ -32,7 +32,7 @@ class DataFrame(Protocol):
         ...
 
     def to_numpy(self) -> np.ndarray:
-        """Return its values, one row for each row of the table."""
+        """Return the values of the columns, one row for each row of the table."""
         ...
 
 
@@ -58,7 +58,7 @@ def table_of(
         names = tuple(name for name in joints.values() if isinstance(name, str)) or joint_names
         return read_joint_states(source, names, topic, time)
     if topic is not None:
-        raise PlanError(f"topic={shown(topic)} is for MCAP logs, but the samples are not from one; remove it")
+        raise PlanError(f"topic={shown(topic)} applies to MCAP logs only; remove it")
     if is_file:
         refuse_other_files(source, _BAG if Path(source).is_dir() else _REMEDY)
         times = TIME_NAMES if time is None else (time,) if isinstance(time, str) else ()
@@ -75,7 +75,7 @@ def table_of(
         rows = numbers("samples", source, ("m", len(joint_names)), error=PlanError)
         columns = dict(zip(joint_names, rows.T, strict=True))
     if by_name and time in TIMES and time not in columns:
-        raise PlanError(f"time={time!r} is for MCAP logs, but the samples are not from one; remove it")
+        raise PlanError(f"time={time!r} applies to MCAP logs only; remove it")
     return Table(columns)
 
 

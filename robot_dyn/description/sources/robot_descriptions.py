@@ -60,7 +60,7 @@ def find(name: str, download: bool) -> Described:
         )
     try:
         module: Any = import_module(f"robot_descriptions.{description}")
-    except Exception as error:  # of git, of the network, of the package
+    except Exception as error:  # git, the network and the package raise their own
         raise CatalogError(f"{name}: cannot be downloaded ({shorten(error, 200)}); try again") from None
     path = getattr(module, "URDF_PATH", None) or getattr(module, "XACRO_PATH", None)
     if path is None:

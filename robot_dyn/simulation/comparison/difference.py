@@ -24,12 +24,12 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 1e-6  # [rad] or [m], for runs without an estimate of their error
-HALF = 0.5  # of the time: least fraction that must be compared to conclude that runs are the same motion
+HALF = 0.5  # fraction of the time: least fraction that must be compared to conclude that runs are the same motion
 _MARGIN = 2.0  # factor on estimated errors
-_ROUNDING = 1e-12  # of the largest |q|: a smaller difference is rounding
-_SAME = 8 * np.finfo(float).eps  # of the largest time: difference of one time computed in two ways
-_PART = 0.5  # of the difference up to which runs are the same motion: largest error of interpolation
-_NEIGHBOUR = 0.5  # of the length of an interval: a shorter neighbour does not bound its error
+_ROUNDING = 1e-12  # fraction of the largest |q|: a smaller difference is rounding
+_SAME = 8 * np.finfo(float).eps  # relative difference of one time computed in two ways
+_PART = 0.5  # fraction of the difference up to which runs are the same motion: largest error of interpolation
+_NEIGHBOUR = 0.5  # fraction of the length of an interval: a shorter neighbour does not bound its error
 _CHUNK = 20_000  # times at which a run is interpolated at once
 
 
@@ -87,9 +87,13 @@ def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
     names = tuple(run.metadata.get("robot", "") for run in (a, b))
     if a.joint_names != b.joint_names:
         both = [f"{name or 'a robot'} ({', '.join(x.joint_names)})" for name, x in zip(names, (a, b), strict=True)]
-        raise QueryError(f"runs of different joints cannot be compared: {both[0]} and {both[1]}; give two of one robot")
+        raise QueryError(
+            f"runs of different joints cannot be compared: {both[0]} and {both[1]}; compare runs of one robot"
+        )
     if all(names) and names[0] != names[1]:
-        raise QueryError(f"runs of different robots, {names[0]} and {names[1]}, cannot be compared; give two of one")
+        raise QueryError(
+            f"runs of different robots, {names[0]} and {names[1]}, cannot be compared; compare runs of one robot"
+        )
     if not (len(a.t) and len(b.t)):
         raise QueryError("a run without samples cannot be compared; simulate it again")
     if max(a.t[0], b.t[0]) > min(a.t[-1], b.t[-1]):

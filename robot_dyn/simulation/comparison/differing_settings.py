@@ -28,7 +28,7 @@ class DifferingSetting:
 
     Attributes:
         name: Name of the setting.
-        a, b: Its values in the two runs, as texts; "—" if a run has none.
+        a, b: Values in the two runs, as texts; "—" if a run has none.
     """
 
     name: str

@@ -106,7 +106,7 @@ def existing(identified: Identified, method: Method, cuts: bool) -> MachineCode 
         cuts: See `machine_code`.
     """
     programs = None
-    if _functions.known(identified.objects, (identified.described, 1, ())) is None:
+    if _functions.cached_value(identified.objects, (identified.described, 1, ())) is None:
         programs = _stored(identified)
         if programs is None:
             return None

@@ -53,7 +53,7 @@ def engine_of(setup: Setup, min_evaluations: float) -> Engine:
             return code
         if not required and not _is_worthwhile(setup, interpreted_before(identified), min_evaluations):
             most = _COMPILED / _in_all(setup, setup.equation.size) if setup.method.controls_error else inf
-            return interpreted_engine(setup, "short: compiling is not worthwhile", most)
+            return interpreted_engine(setup, "the run is too short to compile", most)
         return checked(setup, lambda: _of_one_run(setup))
     except (ImportError, RobotDynError) as error:
         if required:
@@ -99,7 +99,7 @@ def checked(setup: Setup, build: Callable[[], MachineCode]) -> MachineCode:
         TraceError: If a part cannot be compiled; names it.
         MachineError: If the machine code does not agree with the interpreted engine.
     """
-    with log_if_slow("compiling the equations of this run, once for its structure"):
+    with log_if_slow("compiling the equations of this run (cached for runs of the same structure)"):
         code = build()
         check(code, setup)
     return code

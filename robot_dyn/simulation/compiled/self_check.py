@@ -38,11 +38,11 @@ _RANDOM = 4  # states
 _FIRST_S, _MOST = 1.0, 2000  # part of a run that is interpreted first, in [s], and evaluations for it, about 0.2 s
 _ALONG, _AT_TIMES = 100, 100  # states of the first second, and states at random times of the whole run
 _AGAIN = 4  # half the number of states before a later run
-_TRIES = 4  # of spans, each a tenth of the previous one; then only the start is compared
+_TRIES = 4  # number of spans, each a tenth of the previous one; then only the start is compared
 
-_DIFFERENCES = 1e-6  # of a column: differences are right to some 1e-10 of f, over columns of other units
+_DIFFERENCES = 1e-6  # relative to a column: differences are right to some 1e-10 of f, over columns of other units
 _NARROWER = 4.0
-_DOUBT, _ROUNDINGS = 30.0, 300.0  # of f, where forces cancel
+_DOUBT, _ROUNDINGS = 30.0, 300.0  # multiples of the rounding of f, where forces cancel
 
 Pairs = Iterator[tuple[Array, Array]]  # a result of machine code, and that of the interpreted equation
 

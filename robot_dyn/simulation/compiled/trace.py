@@ -140,12 +140,14 @@ def _symbolic(
     equation: StateEquation, symbols_of: Bodies, values: dict[Part, dict[str, Any]], pieces: list[Piece]
 ) -> StateEquation:
     """Return the equation with symbols instead of its numbers."""
-    plant = symbolic_plant(equation.plant, symbols_of(equation.plant.dynamics, ROBOT).of(values.get(ROBOT, {})), values)
+    plant = symbolic_plant(
+        equation.plant, symbols_of(equation.plant.dynamics, ROBOT).with_parameters(values.get(ROBOT, {})), values
+    )
     controller = equation.controller
     if controller is not None:
         models = {}
         for name, model in controller.models.items():
             part = ("model", name)
-            models[name] = symbols_of(model, part).of(values.get(part, {}))
+            models[name] = symbols_of(model, part).with_parameters(values.get(part, {}))
         controller = symbolic_controller(controller, models, values, pieces)
     return StateEquation(plant, controller, equation.canonical, equation.events)

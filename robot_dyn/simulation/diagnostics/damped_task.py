@@ -38,7 +38,7 @@ def damped(setup: Setup, record: Recording) -> Iterator[Remark]:
 def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark]:
     try:
         in_task = task_dynamics(task.model, q, 0 * q, task.frame, rows=task.rows, threshold=task.threshold)
-    except RobotDynError:  # of its model: reported in the outcome of the run
+    except RobotDynError:  # error of the model; the outcome of the run reports it
         return
     smallest = np.asarray(in_task.smallest, float)
     below = smallest < task.threshold

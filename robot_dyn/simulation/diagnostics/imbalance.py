@@ -25,7 +25,7 @@ from robot_dyn.simulation.setup.setup import Setup
 
 _CHECKED = 100  # samples
 _WITHIN = 1e-4  # [rad], [m], [rad/s], [m/s]: displacement of a state along its motion, for dE/dt
-_UNBOOKED = 1e-3  # of the powers
+_UNBOOKED = 1e-3  # fraction of the powers
 _FINER, _TIGHTER = 4, 100  # factors of a smaller step and of a smaller tolerance
 
 _State = tuple[float, Array, Array, Array]  # t, q, v, a

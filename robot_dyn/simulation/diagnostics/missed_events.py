@@ -168,7 +168,7 @@ def _states_of(equation: StateEquation, part: object) -> slice | None:
 
 
 def _displacement(equation: StateEquation, path: Path, q: np.ndarray, k: int, torque: np.ndarray) -> float:
-    """Return how far a torque during step k moves a joint by the end of the run: M⁻¹ τ h (T − t), [rad] or [m]."""
+    """Return the distance by which a torque in step k moves a joint until the end: M⁻¹ τ h (T − t), in [rad] or [m]."""
     try:
         a = np.linalg.solve(equation.plant.at(float(path.t[k])).M(q[k]), torque)
     except (RobotDynError, np.linalg.LinAlgError):

@@ -10,13 +10,14 @@ from math import log
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.sentences import stated
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
 from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, line_parts
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.run.recording import Recording
@@ -61,31 +62,32 @@ def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[
     if isinstance(method, Adaptive) or method.nonsmooth or setup.equation.canonical:
         return ()
     equation, step = setup.equation, setup.taken_step_s if step_s is None else step_s
-    y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
+    y, u_hold = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
-        linear = method, jacobian(equation, 0.0, y, held), len(setup.q0)
+        linear = method, jacobian(equation, 0.0, y, u_hold), len(setup.q0)
         if not excess_rate(*linear)(step) * t > log(EXPLAINS):
             return ()
-        limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
+        limit, motion = longest_step(*linear), fastest(equation, 0.0, y, u_hold)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
     facts = motion.facts | {"method": method.name, "step_s": below(limit)}
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 
-def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Outcome:
+def runaway_outcome(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Outcome:
     """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:
         setup: The setup of the run.
-        record: Its recording.
+        record: Recording of the run.
         fast: The joint that reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome
     if outcome.ending is not Ending.FINISHED or setup.method.controls_error:
         return outcome
     if remarks := step_too_long(setup, outcome.t):
-        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, dict(remarks[0].fields))
+        facts = stated(line_parts(remarks[0].kind), remarks[0].fields)
+        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, facts)
     with np.errstate(all="ignore"):
         if ledger(setup.equation, record).closes:
             return outcome

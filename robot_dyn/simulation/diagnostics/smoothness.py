@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _MOST_CROSSED = 1.0  # widths of a layer that a companion may cross in a step and still show the order of a method
 _THIRDS = 3  # steps of the finest companion in a step of the run
 _REACH = 3.0  # widths of a layer from its middle to its end: 1 − tanh 3 = 0.005, exp(−3²) = 1e-4
-_NEAR_LIMIT = 0.95  # of a level of the actuation
+_NEAR_LIMIT = 0.95  # fraction of a level of the actuation
 LOOKS = 4000  # evaluations, between steps, of parts that do not declare where they switch
 _STATES = 300  # states at which the actuation is computed
 
@@ -46,8 +46,8 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
 
     Args:
         setup: The setup of the run.
-        equation: Its state equation.
-        path: Its states, step by step.
+        equation: State equation of the setup.
+        path: States of the run, step by step.
     """
     if setup.undeclared:
         part, lacks = setup.undeclared[0]

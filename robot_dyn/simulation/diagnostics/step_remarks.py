@@ -25,12 +25,16 @@ from robot_dyn.simulation.setup.setup import Setup
 
 Units = list[tuple[str, str, str]]  # units of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
-KINDS = RemarkKind.EFFORT_REACHED, RemarkKind.STOP_REACHED, RemarkKind.BEYOND  # of levels, in the order of a summary
-_HIDDEN = 0.1  # of the range of a quantity: least excess over the samples next to a window
-_ROUNDING = 1e-9  # of a quantity: a smaller range is noise
+KINDS = (
+    RemarkKind.EFFORT_REACHED,
+    RemarkKind.STOP_REACHED,
+    RemarkKind.BEYOND,
+)  # levels, in the order of a summary
+_HIDDEN = 0.1  # fraction of the range of a quantity: least excess over the samples next to a window
+_ROUNDING = 1e-9  # fraction of a quantity: a smaller range is noise
 _LAST, _LEAST = 0.1, 5  # last part of a run, which is checked for creep, and least number of samples in it
-_STEADY = 0.1  # of a velocity: largest change there
-_LOADED = 0.01, 0.96  # of the level of friction: below, the joint rests; above, it slides
+_STEADY = 0.1  # fraction of a velocity: largest change there
+_LOADED = 0.01, 0.96  # fractions of the level of friction: below, the joint rests; above, it slides
 
 
 def remarks(
@@ -45,8 +49,8 @@ def remarks(
 
     Args:
         setup: The setup of the run.
-        observer: Its observer, closed at the end of the run.
-        observed: Its observations.
+        observer: Observer of the run, closed at its end.
+        observed: Observations of the run.
         t: Times of its samples, (m,), in [s].
         samples: q, v and u side by side, (m, 3n).
         power: Power of each source, (m,), in [W].

@@ -19,10 +19,11 @@ import numpy as np
 
 from robot_dyn.foundations.coefficients import declared
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.sentences import stated
 from robot_dyn.simulation.diagnostics.runaway import EXPLAINS
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, line_parts
 from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -38,7 +39,7 @@ def unstable(
     Args:
         setup: The setup of the run.
         t: Times of its samples, (m,), in [s].
-        y: Its states there, (m, size).
+        y: States of the loop there, (m, size).
         runs_away: True if the run diverged or reached an implausible speed. A continuous loop is examined only then:
             deviations may grow for a while along a correct motion.
         remedies: True to search for the period or the gains that are stable, which takes most of the time.
@@ -168,4 +169,4 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
 
 def _because(reason: Reason, t: float, remark: Remark) -> Outcome:
     """Return the outcome of a run whose divergence a remark explains."""
-    return Outcome(reason, t, remark.joint, dict(remark.fields))
+    return Outcome(reason, t, remark.joint, stated(line_parts(remark.kind), remark.fields))

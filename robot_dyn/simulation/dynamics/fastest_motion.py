@@ -20,7 +20,7 @@ from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
-_FASTEST = "the fastest motion, of joint {moving_joint!r}, {motion} at {rate_per_s:.3g} per second because of "
+_FASTEST = "the fastest motion, at joint {moving_joint!r}, {motion} at a rate of {rate_per_s:.3g} 1/s due to "
 MOTION: Part = _FASTEST + "{source!r}", _FASTEST + BODIES, "no force depends on the motion of {moving_joint!r}"
 """The sentence about the fastest motion, from `Fastest.facts`."""
 
@@ -59,16 +59,16 @@ class Fastest:
         return sentence((MOTION,), self.facts)
 
 
-def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
+def jacobian(equation: StateEquation, t: float, y: Array, u_hold: Array | None) -> Array:
     """Return ∂y'/∂y by differences, without the work integrals, on which y' does not depend.
 
     Args:
         equation: The state equation.
         t: Time, in [s].
         y: State, (m,).
-        held: The actuation in zero-order hold, or None.
+        u_hold: The actuation in zero-order hold, or None.
     """
-    size, rate = len(y) - len(equation.sources), rowwise(lambda row: equation.rate(t, row, held)[0])
+    size, rate = len(y) - len(equation.sources), rowwise(lambda row: equation.rate(t, row, u_hold)[0])
     return by_state(rate, t, y, equation.widths).T[:size, :size]
 
 

@@ -26,10 +26,10 @@ from robot_dyn.queries.units import without_rounding
 from robot_dyn.simulation.dynamics.smooth_differences import ROUNDING, Column
 
 _AT_REST = 1e-9  # part of the sum of magnitudes of the terms of a rate
-_SOLVED = 1e-12  # of the largest entry of x: error of the other entries in the solution of a linear system
+_SOLVED = 1e-12  # fraction of the largest entry of x: error of the other entries in the solution of a linear system
 _LAYER = 20  # widths from v = 0 within which steps resolve a layer of friction
 _ITERATIONS = 60
-_NEAR = 1e-6  # of a threshold that is named as the cause of a kink
+_NEAR = 1e-6  # relative distance of a threshold that is named as the cause of a kink
 
 
 @final
@@ -219,7 +219,7 @@ def _sliding(plant: Plant, q: np.ndarray, v: np.ndarray) -> Plant:
         if effect in plant.equation_of_motion.drives.values():
             raise QueryError(
                 f"linearise: {effect.name} switches at each contact of its gear, so that no linear model describes it;"
-                " take a SeriesElastic with the same motors"
+                " use a SeriesElastic with the same motors"
             )
         interval = effect.at_rest(q)
         acts = np.less(interval.least, 0) | np.greater(interval.most, 0)
@@ -231,7 +231,7 @@ def _sliding(plant: Plant, q: np.ndarray, v: np.ndarray) -> Plant:
         if joints:
             raise QueryError(
                 f"linearise: {effect.name} holds {joints} at rest, where the acceleration has no derivative by v; give"
-                " a velocity other than 0 there, or take RegularisedCoulombFriction instead"
+                " a velocity other than 0 there, or use RegularisedCoulombFriction instead"
             )
     return in_mode(plant, Mode(np.zeros(len(v)), np.sign(v))) if effects else plant
 
@@ -279,7 +279,7 @@ def _slopes(rates: _Rates, x: np.ndarray, is_needed: np.ndarray | bool = True) -
     """Return ∂(a, ż)/∂x, (n + size, m), by the needed entries of x; 0 by the others."""
     needed = np.flatnonzero(np.broadcast_to(is_needed, x.shape))
     here, longest = rates(x), rates.longest_steps(x)
-    columns = {j: Column.of(rates, x, j, here, longest[j]) for j in needed.tolist()}
+    columns = {j: Column.from_function(rates, x, j, here, longest[j]) for j in needed.tolist()}
     values = np.zeros((len(here), len(x)))
     rounding = ROUNDING * rates.magnitudes(x, values)
     for _ in range(2):  # the second time with the rounding from the slopes of the first

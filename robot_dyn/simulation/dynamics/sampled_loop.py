@@ -125,7 +125,7 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> Samp
 
     Args:
         plant: The plant.
-        controller: Its controller.
+        controller: Controller of the setup.
         t: Time, in [s].
         y: State (q, v, z), z of the continuous controller and then of the effects.
     """

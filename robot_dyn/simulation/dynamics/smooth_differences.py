@@ -13,10 +13,10 @@ from typing import final
 import numpy as np
 
 _STEPS = 0.5 ** np.arange(3, 45)
-_AGREE = 1e-6  # of the largest slope of a column: with a larger truncation there is no derivative
-_HIDDEN = 1e-3  # of the largest slope at any step: a larger rounding hides the derivative
-_DOUBT = 1e5  # of the largest rounding of the rates, per unit: a smaller rounding of a slope does not hide it
-_ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is a kink
+_AGREE = 1e-6  # fraction of the largest slope of a column: with a larger truncation there is no derivative
+_HIDDEN = 1e-3  # fraction of the largest slope at any step: a larger rounding hides the derivative
+_DOUBT = 1e5  # times the rounding of the rates per unit: a smaller rounding of a slope does not hide it
+_ONE_SIDED = 0.01  # fraction of a slope: a larger difference between its two sides is a kink
 ROUNDING = 4 * np.finfo(float).eps
 """Rounding of a rate, as a part of the sum of magnitudes of its terms."""
 
@@ -39,7 +39,9 @@ class Column:
     rises: np.ndarray
 
     @classmethod
-    def of(cls, f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, j: int, here: np.ndarray, most: float) -> Column:
+    def from_function(
+        cls, f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, j: int, here: np.ndarray, most: float
+    ) -> Column:
         """Return the differences by entry j, with steps up to `most` that change it by more than rounding."""
         least = 64 * np.spacing(abs(x[j]))
         steps = np.array([h for h in _STEPS if least <= h <= max(most, _STEPS[-5])])

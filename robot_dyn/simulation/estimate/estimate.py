@@ -50,7 +50,7 @@ def estimate(setup: Setup, run: Recording, runner: Runner) -> ErrorEstimate:
 
     Args:
         setup: The setup of the run.
-        run: Its recording.
+        run: Recording of the run.
         runner: Runner of companion runs.
     """
     equation = setup.equation
@@ -87,7 +87,7 @@ def _by_steps(
 
     Args:
         setup: The setup of the run.
-        method: Its method, of fixed step.
+        method: Method of the run, with a fixed step.
         estimated: The run.
         runner: Runner of companion runs.
         turn: Largest angle by which a joint turns in a step, in [rad].

@@ -25,13 +25,13 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 
-_AIM = 0.3  # of the requested error
-_TRUSTED = 0.5  # of the requested error: at a loose tolerance, the estimate may be only this fraction of the true error
+_AIM = 0.3  # fraction of the requested error
+_TRUSTED = 0.5  # smallest fraction of the true error that an estimate at a loose tolerance may be
 _LOOSE = {EXPLICIT: 0.75, STIFF: 0.5}  # power of the requested error: tolerance of the pilot run
 _LOOSEST = 1e-3
 _ATOL = 0.01  # ratio to rtol
 _TRIES = 4  # maximum number of tolerances tried
-_LAST = 0.1  # of the previous tolerance, at most, in the last run: errors of coarse steps may not be proportional
+_LAST = 0.1  # of the previous tolerance at most: errors of coarse steps may not be proportional
 _TOO_MUCH = 1.7  # accepted excess cost, relative to a run with the requested error
 _FEW = 1.5  # steps between ticks, switches and events if these determine the steps
 _MANY = 20  # segments of sampled control; from here on, one RK4 step in each may suffice
@@ -188,5 +188,5 @@ def _refusal(best: _Try, requested: float, rtol: float) -> str:
         method = best.trial.statistics.method
         least = f"{method}'s smallest tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
         why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"
-    remedy = f"use accuracy {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "take a shorter run"
+    remedy = f"use accuracy {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "use a shorter run"
     return f"accuracy {requested:.1e} is not attainable: {why}; {remedy}"

@@ -33,7 +33,7 @@ _BANDS = 2.0, 8.0  # largest factor between the ratio of differences, for m = 3 
 _ROWS = 2000  # largest number of times in an estimate
 _FAR_OFF = 8.0  # times the bound from the other two: larger differences only show that the longest step is too long
 _DOUBT = 3.0  # times the estimate from the order of the method; above it, shorter steps are needed
-_LOST = 0.1  # of the motion, at most 0.1 rad or m: a larger difference of companions is meaningless
+_LOST = 0.1  # fraction of the motion, at most 0.1 rad or m: a larger difference of companions is meaningless
 
 
 @final

@@ -87,7 +87,7 @@ def contacts_of(
 
     Args:
         equation: The state equation.
-        run_parameters: Its run parameters, with nothing held, (O, 1).
+        run_parameters: Run parameters of the equation, with nothing held, (O, 1).
         places: Places of the mode among them.
         most: Number of changes of the mode that accumulate if they lie within a brief time.
         brief: That time, in [s].
@@ -180,7 +180,7 @@ def _gap_columns(effect: Any, n: int, first: int, work: int) -> tuple[Any, ...]:
     """Return joint, entries of y for δ, δ̇, θ̇, the impulse and the work, and B, β and e, of each gap of an effect."""
     joints = np.array(effect.driven(n))
     k = len(joints)
-    numbers = [effect.reflected(n), effect.of("half_gap", n), effect.of("restitution", n)]
+    numbers = [effect.reflected(n), effect.per_joint("half_gap", n), effect.per_joint("restitution", n)]
     rows = [first + i * k + np.arange(k) for i in range(4)]
     return joints, *rows, np.full(k, work), *(np.asarray(values, float) for values in numbers)
 
@@ -205,7 +205,7 @@ def _without(kind: Any, **fields: Any) -> Any:
     return kind(**dict.fromkeys(kind._fields, np.zeros(0)) | fields)
 
 
-NO_CONTACT = _without(  # of an equation in which nothing may hold joints
+NO_CONTACT = _without(  # for an equation in which nothing holds joints
     ContactMode,
     laws=_without(ContactLaws, n=0),
     places=Places._make([np.zeros(0, np.int64)] * 3),

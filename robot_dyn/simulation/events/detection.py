@@ -20,7 +20,7 @@ from robot_dyn.simulation.dynamics.loop_state import Functions
 
 FASTEST = 1e6  # [rad/s] or [m/s]: error control would follow an exploding state forever
 _MARGIN = 4.0  # times the change of a limited actuation in a step, or in the one before
-_STEADY = 0.5  # of a rate: a smaller change of it within a step does not turn it
+_STEADY = 0.5  # fraction of a rate: a smaller change of it within a step does not turn it
 
 
 class LaneEvents(NamedTuple):

@@ -17,7 +17,7 @@ _ROWS = 64  # before the loop returns
 
 
 class EventKind(IntEnum):
-    """The kind of an event: of a joint that may be held, or of a switching function that passes its level."""
+    """The kind of an event at a joint that may be held, or at a switching function that passes its level."""
 
     STRIKES = 0  # a stop
     RESTS_AT_LAST = 1  # at a stop, after bounces

@@ -37,7 +37,7 @@ def first_event(table: EventTable, lanes: Lanes, F: Array, t: float, h: float) -
         lanes: The run at the start of the step.
         F: Dense output of the step, see `between`.
         t: Start of the step, in [s].
-        h: Its length, in [s].
+        h: Length of the step, in [s].
     """
     event, first = first_of_coordinates(table, lanes.y, F, h)
     if not has_functions(table):

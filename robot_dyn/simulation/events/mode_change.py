@@ -197,7 +197,7 @@ def write_guards(mode: ContactMode, y: Array, table: EventTable) -> None:
 
 
 def write_guard(table: EventTable, e: int, active: bool, level: float, side: float) -> None:
-    """Write whether a guard is active; one without a finite level is not."""
+    """Write if a guard is active; a guard without a finite level is not."""
     table.active[e] = active and abs(level) < np.inf
     if table.active[e]:
         table.levels[e], table.sides[e] = level, side

@@ -42,7 +42,7 @@ class Chatter(NamedTuple):
         u: Actuation at the latest three ticks, tick k at index k mod 3, (3, n, W); nan where no tick has been yet.
         reversals: Reversals in a row so far, (n, W).
         streak: Start, duration and amplitude of the current row, (3, n, W).
-        going: Number of runs with a current row, (n,).
+        active_runs: Number of runs with a current row, (n,).
         episodes: Start, duration and amplitude of the reported episodes, (3, n, W); amplitude 0 for none.
     """
 
@@ -51,7 +51,7 @@ class Chatter(NamedTuple):
     u: Array
     reversals: Array
     streak: Array
-    going: Array
+    active_runs: Array
     episodes: Array
 
 
@@ -69,7 +69,7 @@ def tick(chatter: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
     before, middle, now = chatter.u[(k + 1) % 3], chatter.u[(k + 2) % 3], chatter.u[k % 3]
     copy(now, u)
     for j in range(len(u)):
-        if chatter.going[j] > 0 or turns(before[j], middle[j], now[j]):
+        if chatter.active_runs[j] > 0 or turns(before[j], middle[j], now[j]):
             for b in range(u.shape[1]):
                 change, next_change = middle[j, b] - before[j, b], now[j, b] - middle[j, b]
                 if change * next_change < 0.0 or chatter.reversals[j, b] > 0:
@@ -96,7 +96,7 @@ def count(
     least = max(_PART * max(high[j], -low[j]), _LEAST * largest)
     if change * next_change < -(least**2):
         if chatter.reversals[j, b] == 0:
-            chatter.going[j] += 1
+            chatter.active_runs[j] += 1
             chatter.streak[0, j, b], chatter.streak[2, j, b] = chatter.t[0], 0.0
         chatter.reversals[j, b] += 1
         chatter.streak[1, j, b] = t - chatter.streak[0, j, b]
@@ -119,7 +119,7 @@ def close(chatter: Chatter, j: int, b: int) -> None:
             chatter.episodes[1, j, b] += duration
             chatter.episodes[2, j, b] = max(largest, amplitude)
     chatter.reversals[j, b] = 0
-    chatter.going[j] -= 1
+    chatter.active_runs[j] -= 1
 
 
 def close_all(chatter: Chatter) -> None:

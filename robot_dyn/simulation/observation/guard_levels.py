@@ -16,7 +16,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.observation.remarks import RemarkKind
 
-_ROUNDING = 1e-9  # of a limit: a smaller distance counts as reached
+_ROUNDING = 1e-9  # fraction of a limit: a smaller distance counts as reached
 _NONE = 1e9  # larger stops and limits mean none
 
 

@@ -188,7 +188,7 @@ class Remark:
     """An observation about one joint.
 
     Attributes:
-        kind: Its subject.
+        kind: Subject of the remark.
         joint: Name of the joint, or of the effect or frame that it concerns.
         quantity: "q", "v", "u" or "power": the quantity of value and limit.
         start_s: Time of its start, in [s].
@@ -233,6 +233,9 @@ class Remark:
     def remedy(self) -> str:
         """The remedy, the same for all remarks of a kind in a run; empty if there is none."""
         return sentence(_SENTENCES[self.kind].remedy, self.fields)
+
+    def __str__(self) -> str:
+        return _line(self.kind, [self])
 
 
 def line_parts(kind: RemarkKind) -> Parts:

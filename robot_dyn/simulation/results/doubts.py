@@ -1,7 +1,8 @@
-"""Doubts about the accuracy of a run are rows of numbers and names; the one table of this file words them.
+"""Doubts about the accuracy of a run: rows of numbers and names, and the table of their sentences.
 
 A doubt is the reason why an error estimate ends before its run, why it shows no order, or why the energy ledger does
-not close. A kind more: a member of `DoubtKind`, and a row of `_SENTENCES`.
+not close. To add a kind, add a member to `DoubtKind` and a row
+to `_SENTENCES`.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class DoubtKind(StrEnum):
     WORK_OF_NO_EFFECT = "work_of_no_effect"
 
 
-_FINER: Part = "take rtol = {smaller_rtol:.0e}", "take step_s = {smaller_step_s:.0e}"
+_FINER: Part = "use rtol = {smaller_rtol:.0e}", "use step_s = {smaller_step_s:.0e}"
 _AT = ", at t = {at:.4g} s"
 _LIMIT: Part = "{tenth:.2g} [rad] or [m], a tenth of the motion", "{limit:.2g} rad or m"
 _SENTENCES: Mapping[DoubtKind, Parts] = {
@@ -95,10 +96,10 @@ _SENTENCES: Mapping[DoubtKind, Parts] = {
         "and none of them may depend on time",
     ),
 }
-_REMEDIES: Mapping[DoubtKind, Parts] = {  # of the other kinds, a smaller step or tolerance if the facts name one
+_REMEDIES: Mapping[DoubtKind, Parts] = {  # other kinds: a smaller step or tolerance, if the facts name one
     DoubtKind.NO_ORDER_OF_IMPACTS: ("compare it with step_s / 4, or with method='DOP853'",),
-    DoubtKind.OSCILLATION_DAMPED: ("take shorter steps",),
-    DoubtKind.ROUNDING: ("take a shorter run",),
+    DoubtKind.OSCILLATION_DAMPED: ("use shorter steps",),
+    DoubtKind.ROUNDING: ("use a shorter run",),
 }
 
 
@@ -108,7 +109,7 @@ class Doubt:
     """A doubt about the accuracy of a run.
 
     Attributes:
-        kind: Its subject.
+        kind: Subject of the doubt.
         facts: Numbers and names of its sentence, by name. With `smaller_step_s`, in [s], or `smaller_rtol`, a run with
             that setting is the remedy.
     """

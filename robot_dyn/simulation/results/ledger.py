@@ -17,7 +17,7 @@ from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
 _OPEN = 1e-3  # largest residual of a ledger that closes, relative to the energy exchanged
-_ROUNDING = 1e-12  # of the energies whose difference is the residual
+_ROUNDING = 1e-12  # fraction of the energies whose difference is the residual
 # Residuals relative to the energy exchanged: over 150 random scenes they were at most 10 times the estimated error of
 # q relative to the motion. A far larger one contradicts the estimate.
 _CONTRADICTS = 100.0
@@ -48,7 +48,7 @@ class Ledger(Value):
         read_only(self)
 
     def __repr__(self) -> str:
-        if not self.known:
+        if not self.is_recorded:
             return "<Ledger: not recorded>"
         worst = f"largest residual {largest(np.abs(self.residual)):.2e} J of {self.exchanged:.3g} J exchanged"
         return f"<Ledger: {worst}; work of {', '.join(self.work) or 'nothing'}>"
@@ -66,7 +66,7 @@ class Ledger(Value):
         return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
 
     @property
-    def known(self) -> bool:
+    def is_recorded(self) -> bool:
         """True if it was recorded: energies or work of rollouts may be nan throughout."""
         return not np.isnan(self.residual).all()
 
@@ -114,7 +114,7 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
 
     Args:
         ledger: The ledger of a run.
-        error: Its estimated error.
+        error: Estimated error of the run.
         q: Positions at its samples, (m, n).
     """
     if not ledger.closes:
@@ -126,5 +126,5 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
         return ""
     doubt = "do not trust the estimate, " if ledger.cause is None or ledger.cause.is_of_steps else ""
     return (
-        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'take a smaller step'}"
+        f"it does not close as well as the estimated error of q implies: {doubt}{ledger.cause or 'use a smaller step'}"
     )

@@ -46,7 +46,7 @@ def version_remedy(header: Mapping[str, object]) -> str:
 def _check(run: TrajectoryData, members: Members) -> None:
     """Raise a StoreError if the arrays of a run are inconsistent, or their numbers cannot belong to a run."""
     if members.lengths["n"] != len(run.joint_names):
-        raise StoreError(f"'q' is of {members.lengths['n']} joints, 'joint_names' of {len(run.joint_names)}")
+        raise StoreError(f"'q' has {members.lengths['n']} joints, but 'joint_names' has {len(run.joint_names)}")
     if members.not_finite and run.outcome.ending is not Ending.DIVERGED:
         raise StoreError(f"member {shorten(members.not_finite[0])!r} of a run that did not diverge contains nan or inf")
     for name, t in (("t", run.t), *((f"wrenches/{link}", F[:, 0]) for link, F in run.wrenches.items())):
@@ -61,7 +61,7 @@ def _check(run: TrajectoryData, members: Members) -> None:
     if run.desired is None and run.tracking_error is not None and run.tracking_error.shape[1] != 3:
         raise StoreError("member 'tracking_error' of joints needs 'desired', which is missing")
     if not are_times(np.array([run.outcome.t])):
-        raise StoreError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
+        raise StoreError(f"'outcome/t' is {run.outcome.t!r}, which is not a time in [s]")
 
 
 def are_times(t: np.ndarray) -> bool:

@@ -25,7 +25,7 @@ class Statistics:
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Names of the user-defined parts of the setup, which each run calls.
-        one_by_one: Runs of a batch that were made one by one, not in lock step.
+        one_by_one: Runs of a batch that were simulated one by one, not in lock step.
         one_by_one_s: Time of these runs, in [s].
     """
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 from robot_dyn.foundations.errors import escaped
@@ -14,6 +16,7 @@ from robot_dyn.simulation.results.run_data import RunData, TrajectoryData
 from robot_dyn.simulation.run.outcome import Ending
 
 _LISTED = 3  # events in a summary
+_SHORTER = 0.98  # of the requested step; the summary explains a shorter mean step
 _NOTICED = 0.01  # [s]: shorter times are left out
 
 
@@ -27,7 +30,7 @@ def summary(run: TrajectoryData) -> str:
         opening + _after(run.outcome.text),
         *([] if run.acting is None else [f"effects: {', '.join(run.acting) or 'none'}"]),
         *([f"right angles, in machine code: {run.metadata['right_angles']}"] if "right_angles" in run.metadata else []),
-        f"energy ledger: {residual}" + _after(run.leak) if ledger.known else "energy ledger: was not recorded",
+        f"energy ledger: {residual}" + _after(run.leak) if ledger.is_recorded else "energy ledger: was not recorded",
         f"error of q [{unit}]: {run.error or _not_estimated(run)}",
         *about_the_robot(run),
     ]
@@ -37,7 +40,7 @@ def summary(run: TrajectoryData) -> str:
     lines += [line for line in lines_of(run.remarks) if line != run.outcome.text]
     if run.rms_tracking_error is not None:
         lines.append(f"{of_tracking(run, run.desired is None)}: {run.rms_tracking_error:.3e} rms")
-    step = f"step {s.step_s:.4g} s, " if s.step_s else ""
+    step = f"step {s.step_s:.4g} s{_shortened(run)}, " if s.step_s else ""
     lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
     if s.user_code and s.companion_runs:
         lines.append(
@@ -56,6 +59,17 @@ def summary(run: TrajectoryData) -> str:
     return "\n".join(map(escaped, lines))
 
 
+def _shortened(run: TrajectoryData) -> str:
+    """Return the requested step, if the steps taken are shorter by more than 2 % on average; else empty."""
+    try:
+        requested = float(json.loads(run.metadata["settings"])["step"].removesuffix(" s"))
+    except (KeyError, TypeError, ValueError, AttributeError):  # an adaptive method, or a file without settings
+        return ""
+    if not run.statistics.step_s < _SHORTER * requested:
+        return ""
+    return f" (step_s = {requested:g} s, shortened to end at samples, ticks, switches and events)"
+
+
 def of_tracking(run: RunData, of_frame: bool) -> str:
     """Return the heading of a tracking error, with its unit."""
     quantity = "the frame [m]" if of_frame else f"q [{joint_units('q', joint_types(run))}]"
@@ -63,7 +77,7 @@ def of_tracking(run: RunData, of_frame: bool) -> str:
 
 
 def _not_estimated(run: TrajectoryData) -> str:
-    """Return that no error was estimated, and why."""
+    """Return the line for a run without an error estimate, with the reason."""
     if run.outcome.ending is Ending.STOPPED:
         return "not estimated (the run was stopped)"
     return f"not estimated ({'a run of rollouts' if 'run' in run.metadata else 'estimate_error is False'})"

@@ -11,7 +11,7 @@ from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import SAMPLED, TrajectoryData
 
-Types = Mapping[str, str | None]  # of joints, by name
+Types = Mapping[str, str | None]  # types of joints by name
 
 
 def columns(run: TrajectoryData) -> Iterator[Column]:

@@ -88,9 +88,9 @@ class Trajectory(TrajectoryData):
         if not isinstance(proof, Theorem):
             raise QueryError(f"proof: pass the result of rd.tools.proof.prove(setup), got {shown(proof)}")
         if proof.joint_names != self.joint_names:
-            raise QueryError(f"proof is of the joints {', '.join(proof.joint_names)}; give one of this motion")
+            raise QueryError(f"the proof has the joints {', '.join(proof.joint_names)}; pass the proof of this motion")
         if self.t[0] == 0 and not proof.contains(0.0, self.q[0], self.v[0]):
-            raise QueryError("the motion of the proof starts elsewhere; give one of this motion")
+            raise QueryError("the proof starts from another state; pass the proof of this motion")
         return proof.digits_of(self.t, self.q)
 
     def causes(self) -> Causes:

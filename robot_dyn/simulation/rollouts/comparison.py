@@ -28,7 +28,7 @@ class Difference(Value):
 
     Attributes:
         name: Name of the quantity.
-        unit: Its unit.
+        unit: Unit of the quantity.
         median, largest: Median and largest difference over the compared runs; infinite for a run that has a value in
             one way only.
     """

@@ -10,7 +10,7 @@ import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.simulation.compiled.choice import choose_for_batch, for_run
-from robot_dyn.simulation.diagnostics.runaway import judged, runaway
+from robot_dyn.simulation.diagnostics.runaway import runaway, runaway_outcome
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, observation_of, observed
@@ -53,7 +53,7 @@ def singles(
         run.state.stop = stop
         recording = run.record()
         if too_fast := runaway(own, observer.fastest):
-            recording = replace(recording, outcome=judged(own, recording, too_fast))
+            recording = replace(recording, outcome=runaway_outcome(own, recording, too_fast))
         records[i] = _single(batch, own, recording, observer.observation)
 
     def report() -> None:

@@ -27,8 +27,8 @@ class SetupParameter(Value):
     """A parameter that may differ from run to run.
 
     Attributes:
-        name: Its key in `vary` of `rollouts`.
-        value: Its value in the setup.
+        name: Key in `vary` of `rollouts`.
+        value: Value in the setup.
         unit: Unit for a revolute joint, and for a prismatic joint if that differs; empty if it has none.
         shape: Shape of its values over B runs, for example "(B,) or (B, 6)".
     """
@@ -54,12 +54,13 @@ class Parameters(Answer):
     parameters: tuple[SetupParameter, ...]
 
     def blocks(self) -> Iterator[Block]:
-        yield "parameters that rd.rollouts(setup, vary={name: values}) can vary over B runs:"
+        yield "initial states: q0= and v0= of rd.rollouts, each (B, n); --vary 'q0=…' and 'v0=…' of a sweep"
+        yield "parameters that rd.rollouts(setup, vary={name: values}) and --vary of a sweep can vary over B runs:"
         rows = ((x.name, _shown(x.value), x.unit, x.shape) for x in self.parameters)
         yield Table(("name", "value", "unit", "values"), tuple(rows))
 
 
-def parameters(what: Setup | Plant | Dynamics) -> Parameters:
+def parameters(system: Setup | Plant | Dynamics) -> Parameters:
     """Return the parameters that `rollouts` can vary: names, values, units and shapes.
 
     They are coefficients of effects, gains of the controller, gravity, payloads, armature, the factor on all masses,
@@ -67,13 +68,13 @@ def parameters(what: Setup | Plant | Dynamics) -> Parameters:
     `robot-dyn parameters` prints, `to_json()` the document of its `--json`.
 
     Args:
-        what: A setup, a plant or a robot.
+        system: A setup, a plant or a robot.
 
     Raises:
         EffectError: If it is none of these.
     """
-    setup = what if isinstance(what, Setup) else None
-    plant = setup.plant if setup is not None else what if isinstance(what, Plant) else Plant(what)  # pyright: ignore[reportArgumentType]
+    setup = system if isinstance(system, Setup) else None
+    plant = setup.plant if setup is not None else system if isinstance(system, Plant) else Plant(system)  # pyright: ignore[reportArgumentType]
     controller = None if setup is None else setup.controller
     parameters = variable_parameters(plant.dynamics, plant.effects, controller)
     by_name = {parameter.name: setup_parameter(parameter, plant.dynamics) for parameter in reversed(parameters)}

@@ -17,8 +17,8 @@ def in_threads(
         work: Function to call; its error is raised here after all calls have ended.
         count: Number of calls.
         threads: Largest number of threads.
-        stop: Its first entry becomes 1 on Ctrl-C, or if `look` raises an error. Calls in progress and later ones must
-            then end soon. Ctrl-C raises no error here.
+        stop: Array whose first entry becomes 1 on Ctrl-C, or if `look` raises an error. Calls in progress and later
+            ones must then end soon. Ctrl-C raises no error here.
         look: Called some ten times a second, in the thread of the caller.
     """
     with ThreadPoolExecutor(min(threads, count), "robot_dyn") as pool:

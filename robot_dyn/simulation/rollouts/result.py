@@ -204,7 +204,7 @@ class Rollouts(RolloutsData):
         return "\n".join(escaped(line) for line in lines)
 
     def _one_by_one(self) -> Iterator[str]:
-        """Yield how many runs were made one by one, and how long that took."""
+        """Yield the number of runs that were simulated one by one, and their time."""
         ran = self.statistics
         if ran.one_by_one and len(self) > 1:
             remedy = ""
@@ -214,7 +214,7 @@ class Rollouts(RolloutsData):
             yield f"{count} made one by one, in {ran.one_by_one_s:.2g} s of {ran.wall_s:.2g} s{remedy}"
 
     def _early(self) -> str:
-        """Return how many runs ended early, and why."""
+        """Return the number of runs that ended early, and the reasons."""
         at = f" by an interrupt, the first at t = {self.ended_s[self.stopped].min():g} s" if self.stopped.any() else ""
         by_event = sum(outcome.reason is Reason.TERMINAL_EVENT for outcome in self.ends)
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"

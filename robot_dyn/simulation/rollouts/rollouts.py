@@ -50,7 +50,7 @@ RECORDS = ("q", "v", "u", "energy", "work")
 
 @takes_options
 def rollouts(
-    what: Setup | Plant | Dynamics,
+    system: Setup | Plant | Dynamics,
     q0: JointValues | None = None,
     v0: JointValues | None = None,
     *,
@@ -75,8 +75,8 @@ def rollouts(
     if steps may be cut and samples lie within them.
 
     Args:
-        what: A plant, a robot or a setup.
-        q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        system: A plant, a robot or a setup.
+        q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `system` is a setup.
         v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; by default 0, or those of the setup.
         vary: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.parameters` lists the names:
             gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
@@ -113,7 +113,7 @@ def rollouts(
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `max_bytes`.
         TraceError: If a part of the setup cannot be compiled; the message names it.
     """
-    setup = replace(_setup(what, q0, options), estimate_error=False)
+    setup = replace(_setup(system, q0, options), estimate_error=False)
     if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
         setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
     max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1)
@@ -178,7 +178,7 @@ def stepping_groups(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
     if passed is None or passed.some.all():
         return [(runs, passed)]
     with_thresholds = runs[passed.some]
-    return [(with_thresholds, passed.of(with_thresholds)), (runs[~passed.some], None)]
+    return [(with_thresholds, passed.for_runs(with_thresholds)), (runs[~passed.some], None)]
 
 
 def run_batch(
@@ -234,20 +234,20 @@ def _compared(batch: Batch, runs: Rollouts, threads: int, max_bytes: int) -> Com
     return Comparison(len(places), len(batch), others, tuple(differences(quantities, repeated, units)))
 
 
-def _setup(what: Setup | Plant | Dynamics, q0: JointValues | None, options: Mapping[str, Any]) -> Setup:
+def _setup(system: Setup | Plant | Dynamics, q0: JointValues | None, options: Mapping[str, Any]) -> Setup:
     """Return the setup of all runs; for a plant or robot, with the first start."""
     start = {}
-    if not isinstance(what, Setup):
-        what = what if isinstance(what, Plant) else Plant(what)
+    if not isinstance(system, Setup):
+        system = system if isinstance(system, Plant) else Plant(system)
         if q0 is not None:
-            q = joint_values("q0", q0, what.dynamics.joint_names)
+            q = joint_values("q0", q0, system.dynamics.joint_names)
             start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
     for name in ("estimate_error", "accuracy"):
-        if name in options or (name == "accuracy" and isinstance(what, Setup) and what.accuracy is not None):
+        if name in options or (name == "accuracy" and isinstance(system, Setup) and system.accuracy is not None):
             without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
             remedy = "leave it out" if name in options else without
             raise QueryError(f"rollouts: {name} has no effect, simulate one of the runs for that; {remedy}")
-    return setup_of("rollouts", what, {**start, **options})
+    return setup_of("rollouts", system, {**start, **options})
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
@@ -261,7 +261,7 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     shapes = (("B",), ("B", 1), ("B", size)) if limits.of_joints or size == 1 else (("B", *shape),)
     array = numbers(
         f"vary: {name}", values, *shapes,
-        least=limits.least, above=limits.above, infinite=limits.infinite,
+        least=limits.minimum, above=limits.exclusive_minimum, infinite=limits.infinite,
     )  # fmt: skip
     rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), size)))
     for parameter in matches:
@@ -293,5 +293,7 @@ def _unknown(setup: Setup, name: str) -> str:
         return f"{name} names a coefficient of several effects of the plant; give {both}"
     if name.startswith("payload_") and not any(other.startswith("payload_") for other in names):
         payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
-        return f"no {name!r}: the arm has no payload; add one with robot.with_(payload={payload})"
-    return f"no {name!r}; {nearest(name, dict.fromkeys(names))}"
+        return f"no parameter {name!r}: the arm has no payload; add one with robot.with_(payload={payload})"
+    if name.partition(".")[0] in ("q0", "v0"):
+        return f"no parameter {name!r}: initial states vary as arrays; pass q0= and v0=, or vary q0 and v0 of a sweep"
+    return f"no parameter {name!r}; {nearest(name, dict.fromkeys(names))}"

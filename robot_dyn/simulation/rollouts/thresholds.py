@@ -46,7 +46,7 @@ class Thresholds:
         """True for runs that have a threshold, (B,)."""
         return np.isfinite(self.levels).any(axis=0) | self.others
 
-    def of(self, runs: np.ndarray) -> Thresholds:
+    def for_runs(self, runs: np.ndarray) -> Thresholds:
         """Return the thresholds of some of the runs."""
         return replace(self, levels=self.levels[:, runs], others=self.others[runs])
 

@@ -31,7 +31,7 @@ from robot_dyn.simulation.run.watch import DivergedError
 from robot_dyn.simulation.setup.setup import Setup
 
 _BRIEF = 1e-9  # part of a run: events of one joint within it chatter
-_MOST_CHANGES = 1000  # of the mode within the part _BRIEF of a run: no motion between them is resolved
+_MOST_CHANGES = 1000  # changes of mode within the fraction _BRIEF of a run; no motion between them is resolved
 
 
 @final

@@ -43,9 +43,9 @@ from robot_dyn.simulation.events.regions import Regions, pass_level
 from robot_dyn.simulation.run.recording import Loop, log_step, observe_step, sample, share
 from robot_dyn.simulation.run.time_loop import apply_tick, changes_torque, conserves_energy, count_step
 
-_EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
+_EARLY = 1e-9  # fraction of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # repetitions of a step for an event
-_SHORT = 1e-8  # of a step: over such a part of it y is a straight line, to rounding
+_SHORT = 1e-8  # fraction of a step: over such a part of it y is a straight line, to rounding
 _WATCHED = 8  # steps between energy checks
 
 

@@ -32,7 +32,7 @@ from robot_dyn.simulation.setup.schedule import nodes
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.setup import samples as most_samples
 
-_SAMPLES = 1000  # of a run without a record period
+_SAMPLES = 1000  # number of samples without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _CHUNK = 1024  # ends of steps that are allocated at first
 

@@ -153,7 +153,7 @@ class Outcome:
 
 
 TOO_FAST = ("{joint} reached {value:.3g} {unit}, over 100 times its limit ({limit:.3g}): check gains and step",)
-_FASTEST = "; the fastest joint is {joint!r}: take a smaller step than {step_s:g} s, or an implicit method"
+_FASTEST = "; the fastest joint is {joint!r}: use a smaller step than {step_s:g} s, or an implicit method"
 _PERIOD = "; or, if the sampled loop is unstable, a shorter period than {period_s:g} s"
 _BENDS = " ({effect} of joint {effect_joint!r} bends within {width:.1e} {unit})"
 _GROWS = " at t = {t:.9g}, max |y| = {largest:.3g}: y grows without bound, or tolerances are too tight"
@@ -164,7 +164,7 @@ _SENTENCES: Mapping[Reason, Parts] = {
     Reason.STEP_TOO_LONG: line_parts(RemarkKind.TOO_LONG),
     Reason.IMPLAUSIBLE_SPEED: (
         (*TOO_FAST, "{joint} moves faster than {limit:g} rad/s or m/s: check gains and effects"),
-        "; the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
+        "; the energy ledger does not close: use a smaller step than {step_s:g} s, or an implicit method",
     ),
     Reason.ENERGY_WITHOUT_SOURCE: ("energy grows without a source", _FASTEST, _PERIOD),
     Reason.STATE_OVERFLOWS: ("a number overflowed", _GROWS, _FASTEST, _PERIOD),
@@ -174,13 +174,18 @@ _SENTENCES: Mapping[Reason, Parts] = {
         "stalled: the last {steps} steps advanced {advanced_s:.1e} s, {remaining:.0e} more would be needed: the system "
         "is stiff",
         prefixed("; ", MOTION),
-        ": take {remedy}",
+        ": use {remedy}",
         _BENDS,
     ),
-    Reason.STAGES_NOT_FOUND: ("an implicit step has no solution", ": {error}", _FASTEST, _PERIOD, _BENDS),
+    Reason.STAGES_NOT_FOUND: (
+        ("{error}", "the stage equations of an implicit step could not be solved"),
+        _FASTEST,
+        _PERIOD,
+        _BENDS,
+    ),
     Reason.EVENTS_ACCUMULATE: (
         "events accumulate at t = {t:.9g}: {changes} changes of mode in {span_s:.1e} s, the last of joint {joint!r}; "
-        "take {remedy}",
+        "use {remedy}",
     ),
     Reason.TORQUE_NOT_FINITE: ("the controller returned a torque that is not finite", _FASTEST, _PERIOD),
     Reason.CANNOT_EVALUATE: ("{error}, at t = {t:.9g}", _FASTEST, _PERIOD),

@@ -75,7 +75,7 @@ class Records(NamedTuple):
     Attributes:
         rows: Entries of y that are stored in samples, (c,).
         t: Times of samples, (R,), in [s].
-        y, sampled: Those entries, and the other numbers of a sample, (R, c, B) and (R, d, B).
+        y, sampled: Recorded entries of y, and the other numbers of a sample, (R, c, B) and (R, d, B).
         shared_t, shared: States that companion runs share, (S,) and (S, m).
         shared_place: Their segment and step, (S, 2).
         step_log_t, step_log: The ends of steps, (K,), and the states at the first of them, (k, m).

@@ -34,7 +34,7 @@ def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_
     """
     if events and not finds_events:
         raise QueryError(
-            f"events: steps of {method.name} cannot end at them; take method='DOP853'"
+            f"events: steps of {method.name} cannot end at them; use method='DOP853'"
             if method.nonsmooth
             else f"events: in a run of more than {MOST_CUT} steps of {method.name}, steps cannot end at them; take"
             " longer steps, or method='DOP853'"
@@ -42,9 +42,7 @@ def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_
     _check_set_valued(plant, method, finds_events)
     _check_payloads(plant, method)
     if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
-        raise QueryError(
-            f"{drives[0].name}: {method.name} cannot integrate the motors of a drive; take method='DOP853'"
-        )
+        raise QueryError(f"{drives[0].name}: {method.name} cannot integrate the motors of a drive; use method='DOP853'")
 
 
 def check_start(
@@ -112,11 +110,12 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
     ):
         if effects and is_unsuited and not method.nonsmooth:
             raise QueryError(
-                f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {reason};"
-                " take method='DOP853', or 'MoreauJean' with a step_s"
+                f"{effects[0].name}: steps must end where it begins or ceases to hold a joint, but {method.name}"
+                f" {reason};"
+                " use method='DOP853', or 'MoreauJean' with a step_s"
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
-        raise QueryError(f"{other[0].name}: cannot be stepped by {method.name}; take method='DOP853'")
+        raise QueryError(f"{other[0].name}: cannot be stepped by {method.name}; use method='DOP853'")
 
 
 def _check_payloads(plant: Plant, method: Method) -> None:
@@ -126,7 +125,7 @@ def _check_payloads(plant: Plant, method: Method) -> None:
         (method.nonsmooth, f"steps of {method.name} do not end where the payload is picked up or dropped"),
     ):
         if plant.equation_of_motion.payloads and is_unsuited:
-            raise QueryError(f"carried_payload: {reason}; take method='DOP853'")
+            raise QueryError(f"carried_payload: {reason}; use method='DOP853'")
 
 
 def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:

@@ -25,7 +25,7 @@ from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.setup.setup import Options, Setup, no_step, segments
 
-_MAX_SEGMENTS = 1000  # of a cached setup: more take memory, and building them takes little of the time of the run
+_MAX_SEGMENTS = 1000  # in a cached setup: more take memory, and are built fast compared with the run
 
 
 _BUILT = {field.name: field.default_factory() for field in fields(Setup) if field.default_factory is not MISSING}

@@ -20,8 +20,8 @@ from robot_dyn.foundations.errors import QueryError
 MOST_CUT = 200_000  # steps of a run of fixed step whose steps may end at events
 LEAST_STEPS = 3  # on a segment: with fewer, a companion run cannot take longer steps
 ULPS = 4  # units in the last place: times that differ by at most these are equal
-ON_STEP = 1e-9  # of step_s: a sample this close to the end of a step is taken there
-_ROUNDED = 1e-9  # of the period: tolerance for the rounding of k · period
+ON_STEP = 1e-9  # fraction of step_s: a sample this close to the end of a step is taken there
+_ROUNDED = 1e-9  # fraction of the period: tolerance for the rounding of k · period
 
 
 @final

@@ -40,12 +40,12 @@ from robot_dyn.simulation.setup.explanation import control_lines, law
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, MOST_CUT, ON_STEP, Segment, cuts, near, nodes, steps_on
 
 ENGINES = ("auto", "interpreted", "compiled")
-MOST_BYTES = 8 * 2**30  # of all records, by default
+MOST_BYTES = 8 * 2**30  # default limit of all records
 LONGEST_S = LEAST_EXACT / float_info.epsilon  # floats resolve the times of a run up to here
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # estimates; the second for two rows of a quintic reference
 STEP_S = 1e-3  # default step of a method of fixed step
-_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # of an adaptive method, if a part does not declare where it switches
+_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # adaptive method with a part that declares no switches
 
 CACHED = {
     "table_of": "the segments as arrays",
@@ -315,17 +315,17 @@ def _check_segments(setup: Setup) -> None:
     if size > MOST_BYTES:
         raise QueryError(
             f"a run of {setup.duration_s:g} s with {cut:.3g} ticks and switches takes {gibibytes(size)}, more than "
-            f"{gibibytes(MOST_BYTES)}: take a longer period_s of the controller, or a shorter duration_s"
+            f"{gibibytes(MOST_BYTES)}: use a longer period_s of the controller, or a shorter duration_s"
         )
     if steps(setup) > MOST_STEPS:
         raise QueryError(
             f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
-            f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+            f" more than {MOST_STEPS:g}: use a longer step_s, or a shorter duration_s"
         )
     if setup.duration_s > LONGEST_S:
         raise QueryError(
             f"a run of {setup.duration_s:g} s ends at a time that floats resolve to {ulp(setup.duration_s):.1g} s only:"
-            f" take a shorter duration_s, {LONGEST_S:.2g} s at most"
+            f" use a shorter duration_s, {LONGEST_S:.2g} s at most"
         )
 
 
@@ -379,7 +379,7 @@ def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
 
 def too_large(record: str, size: float, most: float, or_else: str = "") -> QueryError:
     """Return the error for a record of more than `most` bytes."""
-    remedy = f"take a longer record_every_s or a shorter duration_s{or_else}"
+    remedy = f"use a longer record_every_s or a shorter duration_s{or_else}"
     return QueryError(f"recording {record} takes {gibibytes(size)}, more than {gibibytes(most)}: {remedy}")
 
 

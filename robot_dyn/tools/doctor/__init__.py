@@ -3,7 +3,7 @@
     check_urdf    the findings of a file, and its repairs (Checkup)
 
 checkup, report                   the whole check; findings as text
-document, finding                 the file; findings and changes
+document, finding, kinds          the file; findings, their kinds, and changes
 spelling, literals, names         findings in the text
 limits, axes, proportions         findings in joints and lengths
 masses, gravity_load              findings in the numbers of the robot

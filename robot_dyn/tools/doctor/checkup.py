@@ -28,6 +28,7 @@ from robot_dyn.tools.doctor import (
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.estimate import missing_inertials
 from robot_dyn.tools.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 if TYPE_CHECKING:
     from robot_dyn.description import Expansion
@@ -85,8 +86,8 @@ class Checkup(Answer):
     def _repr_html_(self) -> str:
         from robot_dyn.foundations import page, table
 
-        rows = ((x.severity.value, x.where, str(x.line or ""), x.what, x.remedy) for x in self.findings)
-        heading = ("", "where", "line", "what", "remedy")
+        rows = ((x.severity.value, x.where, str(x.line or ""), x.message, x.remedy) for x in self.findings)
+        heading = ("", "where", "line", "message", "remedy")
         return page(self.sentence, table(heading, rows, right=("line",)) if self.findings else "")
 
 
@@ -212,11 +213,13 @@ def _examined(
         findings += neighbours.odd_masses(document, stated, volumes)
         findings += () if sheet is None else neighbours.of_data_sheet(document, stated, sheet)
         findings += gravity_load.weak_joints(document, robot, findings)
-        conversions = [x for x in findings if x.changes and ((x.supposed and units) or x.kind == "inertia_unit")]
+        conversions = [
+            x for x in findings if x.changes and ((x.supposed and units) or x.kind == FindingKind.INERTIA_UNIT)
+        ]
         if conversions:
             document = _rewritten(document, conversions)
-    loads = refusal is None and not any(finding.kind == "refused" for finding in findings)
-    findings = [x if x.line else replace(x, line=written.line(x.where, x.what)) for x in findings]
+    loads = refusal is None and not any(finding.kind == FindingKind.REFUSED for finding in findings)
+    findings = [x if x.line else replace(x, line=written.line(x.where, x.message)) for x in findings]
     repaired = None if document is written or document.text == text else document.text
     return _Examined(loads, _gravest_first(findings), repaired, robot is not None, estimated)
 
@@ -306,20 +309,20 @@ def _of_refusal(source: str, message: str, written: Document | None = None) -> F
         where, rest = "file", message.removeprefix(f"{source}: ")
     what, _, remedy = rest.rpartition("; ")
     what, remedy = (what, remedy) if what else (remedy, "correct the file")
-    return Finding(Severity.ERROR, "refused", where, what, remedy, written and written.line(where, what))
+    return Finding(Severity.ERROR, FindingKind.REFUSED, where, what, remedy, written and written.line(where, what))
 
 
 def _assumed(text: str) -> Finding:
     """Return the finding for a departure from the format that is read in a defined way."""
     where, _, rest = text.partition(": ") if text.startswith(("line", "link", "joint")) else ("file", "", text)
     what, _, remedy = rest.partition("; ")
-    return Finding(Severity.WARNING, "format", where, what, remedy)
+    return Finding(Severity.WARNING, FindingKind.FORMAT, where, what, remedy)
 
 
 def _reported(text: str, findings: Iterable[Finding]) -> bool:
     """Return True if the check has already reported a finding of the reader, in other words."""
     reported_limits = {finding.where for finding in findings if finding.kind.startswith("limit")}
-    same = {finding.what for finding in findings}
+    same = {finding.message for finding in findings}
     return text.partition(": ")[0] in reported_limits or any(what in text for what in same)
 
 
@@ -327,8 +330,10 @@ def _of_mesh(note: str) -> Finding:
     where, _, message = note.partition(": ")
     what, _, remedy = message.partition("; ")
     if where == "file":
-        return Finding(Severity.NOTE, "shape_elsewhere", where, what, f"{remedy}; correct the paths")
-    return Finding(Severity.WARNING, "shape_missing", where, what, remedy or "correct its address, or add its folder")
+        return Finding(Severity.NOTE, FindingKind.SHAPE_ELSEWHERE, where, what, f"{remedy}; correct the paths")
+    return Finding(
+        Severity.WARNING, FindingKind.SHAPE_MISSING, where, what, remedy or "correct its address, or add its folder"
+    )
 
 
 def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:

@@ -14,6 +14,7 @@ from robot_dyn import RobotDynError
 from robot_dyn.cli import FILE_AS_STATED, FileOptions, Force, Json, command, completion, progress, show, to_stderr
 from robot_dyn.description import package_folders
 from robot_dyn.foundations import FileKind, QueryError, save, target
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 if TYPE_CHECKING:
     from robot_dyn.tools.doctor.checkup import Checkup
@@ -78,7 +79,8 @@ def check_urdf(
             if file not in written:
                 suspected = {
                     "--units": not units and any(x.supposed for x in checkup.findings),
-                    "--inertia-unit": inertia_unit is None and any(x.kind == "inertia_unit" for x in checkup.findings),
+                    "--inertia-unit": inertia_unit is None
+                    and any(x.kind == FindingKind.INERTIA_UNIT for x in checkup.findings),
                 }
                 options_left = " or ".join(name for name, applies in suspected.items() if applies)
                 hint = f"; {options_left} converts values from a suspected unit" if options_left else ""

@@ -12,6 +12,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description import declared_first, other_format, parse
 from robot_dyn.foundations import DescriptionError
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 from robot_dyn.tools.doctor.tags import Place, decoded, edited, tags
 
 _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
@@ -76,17 +77,23 @@ class Document:
         """Return the value of an attribute as the file writes it, with its line breaks and references."""
         return self._written[slice(*self._stated[element][0].attributes[key][1])]
 
-    def line(self, where: str, what: str) -> int | None:
+    def line(self, where: str, text: str) -> int | None:
         """Return the line of the link or joint, or of an element in it, to which a refusal refers."""
         for part in self.root.iter("link", "joint"):
             if self.where(part) == where:
-                tag = re.match(r"<(\w+)>", what)
+                tag = re.match(r"<(\w+)>", text)
                 inner = () if tag is None else (*part.iterfind(tag[1]), *part.iterfind(f"inertial/{tag[1]}"))
                 return next(iter(inner), part).sourceline
         return None
 
     def finding(
-        self, severity: Severity, kind: str, element: Any, what: str, remedy: str, changes: tuple[Change, ...] = ()
+        self,
+        severity: Severity,
+        kind: FindingKind,
+        element: Any,
+        what: str,
+        remedy: str,
+        changes: tuple[Change, ...] = (),
     ) -> Finding:
         """Return a finding at an element, with its link or joint and its line."""
         return Finding(severity, kind, self.where(element), what, remedy, element.sourceline, changes)

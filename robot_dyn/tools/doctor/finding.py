@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Any, final
 
 from robot_dyn.foundations import UNREPORTED, shorten
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 
 class Severity(Enum):
@@ -82,7 +83,7 @@ class Finding:
         severity: Severity.
         kind: Fixed identifier for programs.
         where: Link, joint or line.
-        what: Description of the fault, with the value.
+        message: Description of the fault, with the value.
         remedy: Suggested correction.
         line: Line of the file, or None.
         changes: Changes by `--fix`; empty if the intended value is unclear.
@@ -91,9 +92,9 @@ class Finding:
     """
 
     severity: Severity
-    kind: str
+    kind: FindingKind
     where: str
-    what: str
+    message: str
     remedy: str
     line: int | None = None
     changes: tuple[Change, ...] = ()
@@ -107,7 +108,7 @@ class Finding:
         return f"{self.where} ({line})" if line else self.where
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.what}; {self.remedy}"
+        return f"{self.place}: {self.message}; {self.remedy}"
 
     def __repr__(self) -> str:
         return f"<Finding, {self.severity.value}: {self}>"

@@ -15,9 +15,17 @@ from robot_dyn import Robot
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 _AFTER = "correct the doubtful masses and lengths of other findings first, then compare again"
-_CAUSES = {"mass_density", "inertia_small", "mass_ratio", "com_outside", "origin_far", "length_long"}
+_CAUSES = {
+    FindingKind.MASS_DENSITY,
+    FindingKind.INERTIA_SMALL,
+    FindingKind.MASS_RATIO,
+    FindingKind.COM_OUTSIDE,
+    FindingKind.ORIGIN_FAR,
+    FindingKind.LENGTH_LONG,
+}
 
 
 def weak_joints(document: Document, robot: Robot, others: Iterable[Finding]) -> Iterator[Finding]:
@@ -30,7 +38,7 @@ def weak_joints(document: Document, robot: Robot, others: Iterable[Finding]) -> 
             joint = document.named("joint", name)
             stated, unit = joint.find("limit").get("effort").strip(), of_joint("N m", joint.get("type"))
             yield document.finding(
-                Severity.NOTE if explained else Severity.ERROR, "effort_gravity", joint,
+                Severity.NOTE if explained else Severity.ERROR, FindingKind.EFFORT_GRAVITY, joint,
                 f'its effort limit "{stated}" is below the {load:.3g} {unit} that gravity alone requires at q = 0, or'
                 " at the nearest position within the limits",
                 _AFTER if explained else "correct the limit, or the masses of the links it carries",

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.description import implausibility
 
 SLACK = 1.21  # on each bound: shapes omit screws and cables, a tenth in length
-_THINNEST = 0.01  # of the farthest point: drawn sheets may have no thickness
+_THINNEST = 0.01  # fraction of the distance of the farthest point: drawn sheets may have no thickness
 _NEAR = 3.0  # largest factor between moments and those of the uniform body, in each direction
 _DENSITIES = 50.0, 8e3  # [kg/m³] of a plausible link in its shape: hollow plastics to steel
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from robot_dyn.tools.doctor.document import Document, parsed
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 from robot_dyn.tools.doctor.literals import limits_in_degrees
 
 _UNITS = {"effort": "N m or N", "velocity": "rad/s or m/s"}
@@ -25,27 +26,27 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
     if limit is None:
         if joint.get("type") != "continuous":
             yield document.finding(
-                Severity.WARNING, "limit_missing", joint, f"is {joint.get('type')} but has no <limit>",
+                Severity.WARNING, FindingKind.LIMIT_MISSING, joint, f"is {joint.get('type')} but has no <limit>",
                 "add one: URDF requires it, and other programs refuse the file",
             )  # fmt: skip
         return
     stated = {key: x for key in ("lower", "upper", *_UNITS) if isfinite(x := parsed(limit.get(key)))}
     if missing := [key for key in _UNITS if limit.get(key) is None]:
         yield document.finding(
-            Severity.WARNING if "effort" in missing else Severity.NOTE, "limit_missing", joint,
+            Severity.WARNING if "effort" in missing else Severity.NOTE, FindingKind.LIMIT_MISSING, joint,
             f"its <limit> has no {' and no '.join(missing)}",
             "add it: URDF requires both, and other programs refuse the file",
         )  # fmt: skip
     for key, unit in _UNITS.items():
         if stated.get(key) == 0:
             yield document.finding(
-                Severity.WARNING, "limit_zero", joint,
+                Severity.WARNING, FindingKind.LIMIT_ZERO, joint,
                 f'its {key} limit is "{limit.get(key).strip()}", which allows no {key} at all',
                 f"give the limit in {unit}",
             )  # fmt: skip
         elif stated.get(key, 0.0) < 0:
             yield document.finding(
-                Severity.WARNING, "limit_negative", joint, f'its {key} limit is "{limit.get(key)}"',
+                Severity.WARNING, FindingKind.LIMIT_NEGATIVE, joint, f'its {key} limit is "{limit.get(key)}"',
                 "remove the sign", (Change(limit, key, limit.get(key).strip().lstrip("-")),),
             )  # fmt: skip
     if joint.get("type") == "continuous" or not {"lower", "upper"} & stated.keys():
@@ -55,14 +56,14 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
         exchanged = Change(limit, "lower", limit.get("upper", "0")), Change(limit, "upper", limit.get("lower", "0"))
         in_degrees = limits_in_degrees(limit)  # 135 … -95: exchanged, they would still be too large
         yield document.finding(
-            Severity.WARNING, "limits_crossed", joint,
+            Severity.WARNING, FindingKind.LIMITS_CROSSED, joint,
             f'its lower limit "{limit.get("lower", "0")}" is above its upper limit "{limit.get("upper", "0")}"',
             "convert them to radians, then exchange them" if in_degrees else "exchange them",
             () if in_degrees else exchanged,
         )  # fmt: skip
     elif lower == upper:
         yield document.finding(
-            Severity.WARNING, "limits_equal", joint,
+            Severity.WARNING, FindingKind.LIMITS_EQUAL, joint,
             f'its limits are both "{limit.get("lower", "0")}", so it cannot move',
             "correct them, or make the joint fixed",
         )  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any
 
 from robot_dyn.tools.doctor.document import Document, parsed
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 NUMBERS = {
     "origin": ("xyz", "rpy"), "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
@@ -41,7 +42,7 @@ def decimal_commas(document: Document) -> Iterator[Finding]:
             text = " ".join(word.replace(",", ".") if _COMMA.fullmatch(word) else word for word in words)
             drawn = element.tag in _DRAWN or element.getparent().tag in ("visual", "collision")
             yield document.finding(
-                Severity.WARNING if drawn else Severity.ERROR, "decimal_comma", element,
+                Severity.WARNING if drawn else Severity.ERROR, FindingKind.DECIMAL_COMMA, element,
                 f'{key} of <{element.tag}> is "{" ".join(words)}", with decimal commas',
                 "write a point; many programs read only the digits before the comma, or drop the element",
                 (Change(element, key, text),),
@@ -58,7 +59,7 @@ def line_breaks(document: Document) -> Iterator[Finding]:
             inertial = element.getparent().tag == "inertial"
             drops = "urdfdom drops the whole <inertial> for that" if inertial else "urdfdom refuses that"
             yield document.finding(
-                Severity.ERROR if inertial else Severity.WARNING, "line_break", element,
+                Severity.ERROR if inertial else Severity.WARNING, FindingKind.LINE_BREAK, element,
                 f"{key} of <{element.tag}> has a line break or tab between its numbers; {drops}",
                 "write its numbers in one line", (Change(element, key, " ".join(words)),),
             )  # fmt: skip
@@ -77,7 +78,7 @@ def near_right_angles(document: Document) -> Iterator[Finding]:
             drawn = element.getparent().tag in ("visual", "collision")
             severity = Severity.WARNING if deviation > 1e-6 and not drawn else Severity.NOTE
             yield document.finding(
-                severity, "near_right_angle", element,
+                severity, FindingKind.NEAR_RIGHT_ANGLE, element,
                 f'rpy "{" ".join(words)}" differs from {meant} by {deviation:.1e} rad', f"write {meant} to 16 digits",
                 (Change(element, key, " ".join(full)),),
             )  # fmt: skip
@@ -111,7 +112,7 @@ def angles_in_degrees(document: Document) -> Iterator[Finding]:
         whole = _all_whole(values, _WHOLE)
         meant = " ".join(repr(radians(x)) for x in values)
         yield document.finding(
-            Severity.WARNING, "degrees", element,
+            Severity.WARNING, FindingKind.DEGREES, element,
             f'{key} "{" ".join(words)}" exceeds one turn ({degrees(max(values, key=abs)):.0f}°)'
             + (": degrees are suspected" if whole else ""),
             "convert to radians", (Change(element, key, meant),) if whole else (),
@@ -121,7 +122,7 @@ def angles_in_degrees(document: Document) -> Iterator[Finding]:
             stated = " and ".join(f'{key} "{limit.get(key).strip()}"' for key in values)
             whole, most = _all_whole(values.values(), 1.0), max(values.values(), key=abs)
             yield document.finding(
-                Severity.WARNING, "degrees", limit,
+                Severity.WARNING, FindingKind.DEGREES, limit,
                 f"{stated}: over one turn ({degrees(most):.0f}°): degrees are suspected",
                 "convert to radians", tuple(Change(limit, key, repr(radians(x))) for key, x in values.items() if whole),
             )  # fmt: skip

@@ -16,21 +16,22 @@ from robot_dyn.description import Structure, implausibility, structure_of
 from robot_dyn.model import findings as doctor
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 _QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may contain colons and semicolons
 _SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)
 _NOTHING = 1e-9  # relative to the largest moment
 _LOST = 1e-6  # relative to the heaviest link and to the largest moment
-_RATIO = 1e4  # of two masses in an arm, for example a base of 100 kg and a finger of 10 g
+_RATIO = 1e4  # largest ratio of two masses in an arm, for example a base of 100 kg and a finger of 10 g
 _KINDS = (
-    (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
-    (Severity.WARNING, "inertia_without_mass", doctor.moments_without_mass),
-    (Severity.WARNING, "mass_tiny", doctor.tiny_masses),
-    (Severity.WARNING, "length_long", doctor.long_lengths),
-    (Severity.WARNING, "mimic_ratio", doctor.large_ratios),
-    (Severity.WARNING, "mimic_limits", doctor.followers_beyond_limits),
-    (Severity.NOTE, "base_mobile", doctor.welded_base),
-    (Severity.NOTE, "inertia_impossible", doctor.impossible_inertias_of_the_base),
+    (Severity.ERROR, FindingKind.INERTIA_IMPOSSIBLE, doctor.impossible_inertias),
+    (Severity.WARNING, FindingKind.INERTIA_WITHOUT_MASS, doctor.moments_without_mass),
+    (Severity.WARNING, FindingKind.MASS_TINY, doctor.tiny_masses),
+    (Severity.WARNING, FindingKind.LENGTH_LONG, doctor.long_lengths),
+    (Severity.WARNING, FindingKind.MIMIC_RATIO, doctor.large_ratios),
+    (Severity.WARNING, FindingKind.MIMIC_LIMITS, doctor.followers_beyond_limits),
+    (Severity.NOTE, FindingKind.BASE_MOBILE, doctor.welded_base),
+    (Severity.NOTE, FindingKind.INERTIA_IMPOSSIBLE, doctor.impossible_inertias_of_the_base),
 )
 
 
@@ -46,9 +47,9 @@ def masses(document: Document, robot: Robot) -> Iterator[Finding]:
 
 def beyond_reach(document: Document, robot: Robot, others: Iterable[Finding]) -> Iterator[Finding]:
     """Report inertias out of proportion to the robot, unless the shape of the link has already revealed them."""
-    shown = {other.where for other in others if other.kind == "inertia_shape"}
+    shown = {other.where for other in others if other.kind == FindingKind.INERTIA_SHAPE}
     for text in doctor.inertias_beyond_reach(structure_of(robot.description, robot.edits)):
-        finding = _of_words(Severity.ERROR, "inertia_far", text)
+        finding = _of_words(Severity.ERROR, FindingKind.INERTIA_FAR, text)
         if finding.where not in shown:
             yield replace(finding, line=document.line(finding.where, ""))
 
@@ -56,9 +57,9 @@ def beyond_reach(document: Document, robot: Robot, others: Iterable[Finding]) ->
 def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
     """Yield the findings that `load` also reports."""
     for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
-        yield _of_words(Severity.ERROR, "inertia_missing", text)
+        yield _of_words(Severity.ERROR, FindingKind.INERTIA_MISSING, text)
     for text in doctor.for_other_programs(stated, robot.description):
-        yield _of_words(Severity.NOTE, "other_programs", text)
+        yield _of_words(Severity.NOTE, FindingKind.OTHER_PROGRAMS, text)
     idle = _negligible(stated)
     for severity, kind, find in _KINDS:
         for text in find(stated):
@@ -78,7 +79,7 @@ def _negligible(stated: Structure) -> set[str]:
     }
 
 
-def _of_words(severity: Severity, kind: str, text: str) -> Finding:
+def _of_words(severity: Severity, kind: FindingKind, text: str) -> Finding:
     """Convert a sentence of `model.findings` to a finding with place, fault and remedy."""
     if match := _SENTENCE.fullmatch(text):
         return Finding(severity, kind, match[1], match[2], match[3])
@@ -89,7 +90,7 @@ def _of_words(severity: Severity, kind: str, text: str) -> Finding:
 def _massless(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
     """Report bodies without mass: an error if they have a shape or M is singular, else a warning, as in a wrist."""
     for text in doctor.massless_bodies(stated):
-        finding = _of_words(Severity.WARNING, "mass_missing", text)
+        finding = _of_words(Severity.WARNING, FindingKind.MASS_MISSING, text)
         links = next((links for links in stated.bodies.values() if finding.where == f"link {links[0]!r}"), ())
         drawn = any(_has_shape(document, name) for name in links)
         singular = robot.joint_without_inertia is not None
@@ -104,13 +105,13 @@ def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]
     for name, (least, _, most) in moments.items():
         if name in points and len(points) >= max(2, len(moving) / 2):
             yield document.finding(
-                Severity.WARNING, "inertia_zero", document.named("link", name),
+                Severity.WARNING, FindingKind.INERTIA_ZERO, document.named("link", name),
                 f"all its moments are 0, like those of a point of {moving[name].mass:g} kg, but it has a shape",
                 "add moments, or remove its <inertia> and estimate them: --fix with --density",
             )  # fmt: skip
         elif abs(least) <= _NOTHING * most:
             yield document.finding(
-                Severity.NOTE, "inertia_zero", document.named("link", name),
+                Severity.NOTE, FindingKind.INERTIA_ZERO, document.named("link", name),
                 f"its smallest principal moment is 0, like that of a rod or a point of {moving[name].mass:g} kg, which"
                 " MuJoCo rejects",
                 "give it the moments of a body with some width",
@@ -129,7 +130,7 @@ def _merged(document: Document, robot: Robot, stated: Structure) -> Iterator[Fin
         if len(links) > 1 and body.mass > 0 and (why := implausibility(body.mass, body.lever, body.inertia)):
             listed = ", ".join(map(repr, links[:4]))
             yield document.finding(
-                Severity.ERROR, "inertia_impossible", document.named("link", links[0]),
+                Severity.ERROR, FindingKind.INERTIA_IMPOSSIBLE, document.named("link", links[0]),
                 f"merged with the links fixed to it ({listed}), {why}",
                 "correct the inertias of these links: their numbers, order or signs",
             )  # fmt: skip
@@ -149,7 +150,7 @@ def _proportions(document: Document, stated: Structure) -> Iterator[Finding]:
         typical = float(np.exp(np.median(np.log(list(mass_of.values())))))
         odd = light if typical / least > most / typical else heavy
         yield document.finding(
-            Severity.WARNING, "mass_ratio", document.named("link", odd),
+            Severity.WARNING, FindingKind.MASS_RATIO, document.named("link", odd),
             f"the masses of moving bodies range from {least:.3g} kg ({light!r}) to {most:.3g} kg ({heavy!r})",
             "check its mass and unit",
         )  # fmt: skip

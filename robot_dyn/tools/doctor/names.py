@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 _EXPRESSION = re.compile(r"\$[{(][^})]*[})]")
 
@@ -22,7 +23,7 @@ def names(document: Document) -> Iterator[Finding]:
             if count > 1:
                 *_, last = (x for x in document.root.iterfind(kind) if (x.get("name") or "").strip() == name)
                 what, remedy = f"is defined {count} times", "rename all but one, or remove the copies"
-                yield document.finding(Severity.ERROR, "name_twice", last, what, remedy)
+                yield document.finding(Severity.ERROR, FindingKind.NAME_TWICE, last, what, remedy)
     for element in document.elements():
         for key in ("name", "link", "joint"):
             name = element.get(key)
@@ -30,17 +31,19 @@ def names(document: Document) -> Iterator[Finding]:
                 continue
             if name != name.strip():
                 yield document.finding(
-                    Severity.WARNING, "name_blanks", element, f"{key} {name!r} of <{element.tag}> has blanks around it",
+                    Severity.WARNING, FindingKind.NAME_BLANKS, element,
+                    f"{key} {name!r} of <{element.tag}> has blanks around it",
                     "remove them: other programs do not find that name", (Change(element, key, name.strip()),),
                 )  # fmt: skip
             elif key == "name" and (not name.isascii() or re.search(r"[\s/]", name)):
                 yield document.finding(
-                    Severity.NOTE, "name_letters", element, "its name has blanks, slashes or letters beyond ASCII",
+                    Severity.NOTE, FindingKind.NAME_LETTERS, element,
+                    "its name has blanks, slashes or letters beyond ASCII",
                     "rename it: programs that use names as topics or variables refuse it",
                 )  # fmt: skip
     for name in sorted({*listed["link"]} & {*listed["joint"]}):
         yield Finding(
-            Severity.NOTE, "name_shared", f"link {name!r}", "a joint has the same name",
+            Severity.NOTE, FindingKind.NAME_SHARED, f"link {name!r}", "a joint has the same name",
             "rename one of them: programs with one table of names confuse them",
         )  # fmt: skip
 
@@ -51,7 +54,7 @@ def leftovers(document: Document) -> Iterator[Finding]:
         if isinstance(element.tag, str) and (match := _EXPRESSION.search(" ".join(map(str, element.attrib.values())))):
             grave = document.moves_mass(element) or element.tag in ("link", "joint", "limit", "dynamics")
             yield document.finding(
-                Severity.ERROR if grave else Severity.WARNING, "xacro", element,
+                Severity.ERROR if grave else Severity.WARNING, FindingKind.XACRO, element,
                 f"contains {match[0]}, which was not expanded",
                 "expand the file: xacro robot.xacro > robot.urdf, or add --xacro NAME=VALUE for its arguments (xacro="
                 " in Python)",

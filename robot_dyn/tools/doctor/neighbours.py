@@ -20,13 +20,15 @@ from robot_dyn.foundations import QueryError, nearest, shown
 from robot_dyn.model import findings as doctor
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 from robot_dyn.tools.doctor.repairs import KEYS, UNITS, scaled
 
 _WIDE, _FAR = 3.0, 10.0  # [m] k and joint distances of arms with one or two joints: larger than any arm
 _UNIT = 8.0  # median of k relative to the arm; 0.1 to 0.8 in 40 arms of the catalog, and 30 times that in g m²
 _TYPICAL = 0.08, 0.8  # the same ratio in kg m²
 _LIGHTER, _LIGHTEST = 30.0, 10.0  # times lighter than each neighbour, and than all other bodies
-_STEEL, _HEAVIER = 8e3, 4.0  # [kg/m³]; times heavier than each neighbour
+_STEEL, _LEAD = 8e3, 1.2e4  # [kg/m³]; above lead a shape covers part of its link, or `mass_density` reports it
+_HEAVIER = 4.0  # times heavier than each neighbour
 _DIFFERENT = 0.05  # relative difference of masses from those of a data sheet
 _ASK = "compare with the data sheet: give --mass {}=KG or --total-mass KG (mass=, total_mass= in Python)"
 
@@ -54,14 +56,14 @@ def wide_links(document: Document, stated: Structure, shaped: Container[str]) ->
                 else f"{k / ratio:.3g} m, the size of this link in its arm"
             )
             yield document.finding(
-                Severity.WARNING, "inertia_wide", document.named("link", name).find("inertial"),
+                Severity.WARNING, FindingKind.INERTIA_WIDE, document.named("link", name).find("inertial"),
                 f"for {link.mass:g} kg, its inertia needs mass at least {k:.3g} m from the centre, beyond {most}",
                 f"correct the mass, the inertia, or its unit; {_ASK.format(name)}",
             )  # fmt: skip
     for name, joint in stated.joints.items() if small else ():
         if (length := hypot(*joint.xyz)) > _FAR:
             yield document.finding(
-                Severity.WARNING, "origin_far", document.named("joint", name),
+                Severity.WARNING, FindingKind.ORIGIN_FAR, document.named("joint", name),
                 f"its origin is {length:.3g} m from its parent link, over {_FAR:g} m, the largest in arms of one or two"
                 " joints",
                 "correct it, or convert it to metres",
@@ -98,7 +100,7 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
         elements = [*document.root.iterfind("link/inertial/inertia")] if power in units else []
         changes = (Change(x, key, scaled(x.get(key), -power)) for x in elements for key in KEYS if _nonzero(x, key))
         yield Finding(
-            Severity.ERROR, "inertia_unit", "robot",
+            Severity.ERROR, FindingKind.INERTIA_UNIT, "robot",
             "the moments of all links are too large by a common factor: their radii of gyration are typically"
             f" {np.median(ratios):.0f} times the size of the link: the unit {' or '.join(units.values())} is suspected",
             f"export in kg m², or convert all moments: {' or '.join(map(_option, units.values()))}",
@@ -106,7 +108,8 @@ def common_unit(document: Document, stated: Structure, unit: str | None) -> Iter
         )  # fmt: skip
     if unit is not None and power not in units:
         yield Finding(
-            Severity.NOTE, "inertia_unit", "robot", f"its moments do not look like {name} and were not converted",
+            Severity.NOTE, FindingKind.INERTIA_UNIT, "robot",
+            f"its moments do not look like {name} and were not converted",
             f"choose {' or '.join(units.values())}" if units else "remove inertia_unit, or correct single links",
         )  # fmt: skip
 
@@ -146,7 +149,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
 
     Args:
         document: The file.
-        stated: Its structure.
+        stated: Structure of the robot.
         volumes: Volume of the shapes of each link, in [m³].
     """
     mass_of = {joint: sum(stated.links[name].mass for name in links) for joint, links in stated.bodies.items()}
@@ -163,7 +166,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
         density = mass / volume if volume else 0.0
         if alone and min(masses) > _LIGHTER * mass:
             what = f"its body has {mass:.3g} kg, but its neighbours have {min(masses):.3g} kg or more"
-        elif density > _STEEL and mass > _HEAVIER * max(masses) > 0:
+        elif _STEEL < density <= _LEAD and mass > _HEAVIER * max(masses) > 0:
             what = (
                 f"its body has {mass:.4g} kg, {mass / max(masses):.2g} times its heaviest neighbour, and"
                 f" {density:.4g} kg/m³, more than steel"
@@ -172,7 +175,7 @@ def odd_masses(document: Document, stated: Structure, volumes: Mapping[str, floa
             continue
         name = stated.joints[joint].child
         element = document.named("link", name)
-        yield document.finding(Severity.WARNING, "mass_neighbours", element, what, _ASK.format(name))
+        yield document.finding(Severity.WARNING, FindingKind.MASS_NEIGHBOURS, element, what, _ASK.format(name))
 
 
 def of_data_sheet(document: Document, stated: Structure, sheet: Sheet) -> Iterator[Finding]:
@@ -181,14 +184,14 @@ def of_data_sheet(document: Document, stated: Structure, sheet: Sheet) -> Iterat
         own = stated.links[name].mass
         if abs(own - mass) > _DIFFERENT * mass:
             yield document.finding(
-                Severity.WARNING, "mass_sheet", document.named("link", name),
+                Severity.WARNING, FindingKind.MASS_SHEET, document.named("link", name),
                 f"its mass is {own:.4g} kg, but {mass:.4g} kg was given for it: a factor of {own / mass:.3g}",
                 "correct the mass, and the moments with it if they have the same factor",
             )  # fmt: skip
     total = sum(link.mass for link in stated.links.values())
     if sheet.total is not None and abs(total - sheet.total) > _DIFFERENT * sheet.total:
         yield document.finding(
-            Severity.WARNING, "mass_sheet", document.root,
+            Severity.WARNING, FindingKind.MASS_SHEET, document.root,
             f"all links together have {total:.4g} kg, but {sheet.total:.4g} kg was given: a factor of"
             f" {total / sheet.total:.3g}",
             "give --mass LINK=KG for links you know, to find the wrong one; correct its mass",

@@ -18,6 +18,7 @@ import numpy as np
 from robot_dyn.description import BEYOND, GIMBAL, SEVERAL, TOOL
 from robot_dyn.tools.doctor.document import Document, parsed
 from robot_dyn.tools.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 _FAR = 100.0
 _MOVING = ("revolute", "continuous", "prismatic")
@@ -76,7 +77,7 @@ def _finding(
 ) -> Finding:
     quantity = "centre of mass" if origin.getparent().tag == "inertial" else "origin"
     return document.finding(
-        severity, "origin_far", origin,
+        severity, FindingKind.ORIGIN_FAR, origin,
         f'its {quantity}, xyz "{" ".join(origin.get("xyz").split())}", is {length:.3g} m away, but the median link'
         f" length of this robot is {median:.3g} m",
         "correct it, or convert it to metres",

@@ -18,7 +18,7 @@ from robot_dyn.tools.doctor.inertia_bounds import Body, matrix
 
 KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
-_SAME = 1e-3  # of the largest moment: candidates this close are one
+_SAME = 1e-3  # fraction of the largest moment: candidates this close are one
 _POWERS = (-3, -2, -1, 1, 2, 3)
 # Orders in which programs write six moments, as places in ixx, ixy, ixz, iyy, iyz, izz
 _ORDERS = {
@@ -66,7 +66,8 @@ def _candidates(body: Body, texts: dict[str, str], mass: str) -> Iterator[Repair
 
 def _axes(texts: dict[str, str]) -> Iterator[Repair]:
     places = {(0, 0): "ixx", (0, 1): "ixy", (0, 2): "ixz", (1, 1): "iyy", (1, 2): "iyz", (2, 2): "izz"}
-    for axes in list(permutations(range(3)))[1:]:
+    orders = list(permutations(range(3)))[1:]
+    for axes in sorted(orders, key=lambda axes: sum(i != axis for i, axis in enumerate(axes))):  # exchanges first
         fixed = [_AXES[i] for i in range(3) if axes[i] == i]
         turned = [_AXES[i] for i in range(3) if axes[i] != i]
         what = f"the axes {' and '.join(turned)} exchanged" if fixed else "the axes x, y and z in another order"

@@ -25,7 +25,9 @@ def sentence(findings: tuple[Finding, ...]) -> str:
     places = list(dict.fromkeys(finding.place for finding in findings))
     more = ", …" if len(places) > _PLACES else ""
     listed = ", ".join(places[:_PLACES])
-    return f"{first.severity.value}: {first.kind}, {len(findings)} times: {listed}{more}; {first.what}; {first.remedy}"
+    return (
+        f"{first.severity.value}: {first.kind}, {len(findings)} times: {listed}{more}; {first.message}; {first.remedy}"
+    )
 
 
 def counted(findings: Iterable[Finding]) -> str:

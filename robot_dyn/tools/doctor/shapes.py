@@ -23,6 +23,7 @@ from robot_dyn.shapes import MeshError, surface
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 from robot_dyn.tools.doctor.inertia_bounds import SLACK, Body, excess
+from robot_dyn.tools.doctor.kinds import FindingKind
 from robot_dyn.tools.doctor.repairs import KEYS, repairs, scaled
 from robot_dyn.view import Piece, solids
 
@@ -30,14 +31,20 @@ _SLACK = 1.1  # on a shape's extent: collision shapes omit screws
 _LIGHT, _HEAVY = 2.0, 1.2e4  # [kg/m³] of a link in its convex hull: lighter than foam, heavier than lead
 _CONCENTRATED = 0.15  # relative to a uniform body's inertia; the minimum of 20 arms in the catalog is 0.35
 _LONG, _LEAST_LONG = 10.0, 10.0  # times the length of the arm, and [m]: longer shapes are in millimetres
-_SIZE = "shape_in_mm"
+_SIZE = FindingKind.SHAPE_IN_MM
 _MATERIAL, _MOST, _FEWEST = (
     0.01,
     0.6,
     4,
 )  # deviation from the median density; fraction of links; minimum number of different masses
-IMPOSSIBLE = "inertia_impossible", "inertia_shape", "inertia_direction"
-_EXPLAINED = *IMPOSSIBLE, "mass_density", "com_outside", "inertia_small", "shape_in_mm"
+IMPOSSIBLE = FindingKind.INERTIA_IMPOSSIBLE, FindingKind.INERTIA_SHAPE, FindingKind.INERTIA_DIRECTION
+_EXPLAINED = (
+    *IMPOSSIBLE,
+    FindingKind.MASS_DENSITY,
+    FindingKind.COM_OUTSIDE,
+    FindingKind.INERTIA_SMALL,
+    FindingKind.SHAPE_IN_MM,
+)
 _AXIS = 0.9999  # largest component of a direction that is an axis, within 0.8°
 _GRAVE = 3.0  # ratio of ½ tr I to m d² above which M is wrong by a factor; below, values may be rounded
 
@@ -143,7 +150,7 @@ def of_one_density(document: Document, robot: Robot, of: dict[str, Shape]) -> It
     if different >= _FEWEST and different >= _MOST * len({links[name].mass for name in mass_of}):
         total = sum(link.mass for link in links.values())
         yield document.finding(
-            Severity.NOTE, "density_uniform", document.root,
+            Severity.NOTE, FindingKind.DENSITY_UNIFORM, document.root,
             f"{len(alike)} of {len(mass_of)} links have a density of {median:.4g} kg/m³ within 1 % ({total:.4g} kg in"
             " total): computed from one material, which is unlikely for an arm with motors and gears",
             "compare the total with the data sheet; Robot.with_(mass_scale=…) scales all masses",
@@ -185,7 +192,7 @@ def _mass(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding |
     suspected = ": grams are suspected" if grams else ""
     changes = (Change(mass, "value", scaled(mass.get("value"), -3)),) if grams else ()
     return Finding(
-        Severity.WARNING, "mass_density", f"link {name!r}",
+        Severity.WARNING, FindingKind.MASS_DENSITY, f"link {name!r}",
         f'its mass of "{mass.get("value").strip()}" kg in its shape gives a density of {density:.3g} kg/m³{suspected}',
         "correct the mass, or its unit", inertial.sourceline, changes, True,
     )  # fmt: skip
@@ -198,7 +205,7 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
     if half <= _SLACK * most:
         return None
     return Finding(
-        Severity.ERROR if half >= _GRAVE * most else Severity.WARNING, "inertia_shape", f"link {name!r}",
+        Severity.ERROR if half >= _GRAVE * most else Severity.WARNING, FindingKind.INERTIA_SHAPE, f"link {name!r}",
         f"for {link.mass:g} kg, its inertia needs mass at least {np.sqrt(half / link.mass):.3g} m from the centre, but"
         f" its shape ends at {far:.3g} m: {half / most:.3g} times the largest inertia of this"
         " shape at any density",
@@ -213,7 +220,7 @@ def _small(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding 
     if not 0 < ratio < _CONCENTRATED:
         return None
     return Finding(
-        Severity.WARNING, "inertia_small", f"link {name!r}",
+        Severity.WARNING, FindingKind.INERTIA_SMALL, f"link {name!r}",
         f'its inertia is {ratio:.2g} times that of {link.mass:g} kg spread over its shape: the mass is too large, or'
         " the inertia too small",
         "correct the mass or the inertia, or their units", inertial.sourceline,
@@ -240,7 +247,7 @@ def directions(
             severity = Severity.WARNING if most.ratio > _GRAVE and name not in stated.base else Severity.NOTE
             inertial = document.named("link", name).find("inertial")
             yield document.finding(
-                severity, "inertia_direction", inertial,
+                severity, FindingKind.INERTIA_DIRECTION, inertial,
                 f"along {_direction(most.n)} of its <inertial>, its moments need mass at least {most.needed:.3g} m from"
                 f" the centre, but its shape ends at {most.extent:.3g} m: {most.ratio:.3g} times the largest second"
                 " moment at any density",
@@ -308,16 +315,16 @@ def _explained(document: Document, name: str, body: Body, finding: Finding) -> F
     if not candidates:
         return finding
     mistakes = ", or ".join(candidate.mistake for candidate in candidates)
-    what = f"{finding.what}: possible mistake: {mistakes}"
+    message = f"{finding.message}: possible mistake: {mistakes}"
     if len(candidates) > 1:
-        return replace(finding, what=what)
+        return replace(finding, message=message)
     (texts,) = [candidate.texts for candidate in candidates]
     changes = tuple(
         Change(mass if key == "value" else moments, key, text)
         for key, text in texts.items()
         if text != (mass if key == "value" else moments).get(key, "0")
     )
-    return replace(finding, what=what, changes=changes, supposed=True)
+    return replace(finding, message=message, changes=changes, supposed=True)
 
 
 def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
@@ -334,7 +341,7 @@ def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
             inertial = document.named("link", name).find("inertial")
             xyz = inertial.find("origin").get("xyz", "0 0 0") if inertial.find("origin") is not None else "0 0 0"
             yield document.finding(
-                Severity.NOTE if name in stated.base else Severity.WARNING, "com_outside", inertial,
+                Severity.NOTE if name in stated.base else Severity.WARNING, FindingKind.COM_OUTSIDE, inertial,
                 f'its centre of mass "{" ".join(xyz.split())}" m is {away + room:.2g} m outside its'
                 " shape",
                 "correct the origin of its <inertial>: the position of the centre of mass in the frame of the link",

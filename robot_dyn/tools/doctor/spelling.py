@@ -11,9 +11,10 @@ from typing import Any
 
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.kinds import FindingKind
 
 _SHAPES = {"box": {"size"}, "cylinder": {"radius", "length"}, "sphere": {"radius"}, "mesh": {"filename", "scale"}}
-CHILDREN: dict[str, set[str]] = {  # of URDF, with extensions of ROS, Gazebo and Drake
+CHILDREN: dict[str, set[str]] = {  # children in URDF, with extensions of ROS, Gazebo and Drake
     "link": {"inertial", "visual", "collision", "self_collision_checking", "contact", "verbose"},
     "joint": {"origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller"},
     "inertial": {"origin", "mass", "inertia"},
@@ -64,7 +65,8 @@ def _only(tag: str, missing: set[str]) -> list[str]:
 
 
 def _finding(document: Document, element: Any, item: str, near: list[str], key: str) -> Finding:
-    kind, problem = "unknown_attribute" if key else "unknown_element", f"{item} is unknown in URDF and is ignored"
+    kind = FindingKind.UNKNOWN_ATTRIBUTE if key else FindingKind.UNKNOWN_ELEMENT
+    problem = f"{item} is unknown in URDF and is ignored"
     if not near:
         return document.finding(Severity.NOTE, kind, element, problem, "remove it, or use the name in URDF")
     change = Change(element, near[0], "", key) if key else Change(element, "", near[0])

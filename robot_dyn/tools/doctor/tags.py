@@ -31,7 +31,7 @@ class Tag:
     """An element of a text, by positions in the text.
 
     Attributes:
-        names: Its name in the start tag, and in the end tag if there is one.
+        names: Name in the start tag, and in the end tag if there is one.
         attributes: Names of the attributes, each with the spans of name and value.
         start: Span of the start tag.
         stop: End of the element.

@@ -19,7 +19,7 @@ from robot_dyn.foundations import Value, read_only
 
 _STATES = 400
 _DEPENDENT = 1e-8  # remainder of a unit column after projection: far above rounding, far below that of any arm
-_NEGLIGIBLE = 1e-7  # of the largest entry of R
+_NEGLIGIBLE = 1e-7  # fraction of the largest entry of R
 
 
 @final

@@ -55,10 +55,10 @@ _DRAWS = 50  # random series for each start
 _PENALTIES, _STEPS = tuple(20.0 * 2.0**k for k in range(6)), 80
 _CENTRES, _MIDDLE, _ROOM = 1000, 0.6, 0.9  # mean positions tried, their part of the range, their use of limits
 _REDUCTIONS, _REDUCED = 200, 1.001
-_NOISE = 0.01  # of the torque limit
-_SLOW = 0.05  # of the velocity limit, or of 1 rad/s: below it, Coulomb friction is smooth
+_NOISE = 0.01  # fraction of the torque limit
+_SLOW = 0.05  # fraction of the velocity limit, or of 1 rad/s: below it, Coulomb friction is smooth
 _TURN = np.pi  # [rad]: range of a joint without limits, to each side
-_RANGE = 1e-6, 1e6  # of limits and noise, so that squares and ratios do not overflow
+_RANGE = 1e-6, 1e6  # range of limits and noise: squares and ratios do not overflow
 _TABLE = FileKind("a table of a motion", ".csv", b"t [s],q ")
 
 
@@ -266,7 +266,7 @@ class Problem:
         n = self.information.arm.n
         x = rng.normal(size=(self.series.size, n))
         x[0] = 0.0
-        largest = np.abs(_motion(x, self.basis)).max(axis=1)  # of q, v and a
+        largest = np.abs(_motion(x, self.basis)).max(axis=1)  # of each |q|, |v| and |a|
         middle, half = self._range
         centre = self._centre(rng)
         room = np.stack([half - np.abs(centre - middle), self.bounds["velocity"], self.bounds["acceleration"]])

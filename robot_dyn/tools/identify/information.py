@@ -97,7 +97,7 @@ class Information(Value):
     def sizes(self) -> np.ndarray:
         """Differences worth seeing, (p,); see `ExpectedPrecision`."""
         mass = self.arm.inertial_parameters.reshape(-1, 10)[:, 0]
-        mass = np.maximum(mass, mass.sum() / 100)  # a body without mass takes part in no motion
+        mass = np.maximum(mass, mass.sum() / 100)  # the motion does not depend on a body without mass
         by_kind = np.array([1.0, *[SHIFT_M] * 3, *[SHIFT_M**2] * 6])
         inertial = np.outer(mass, by_kind).ravel()[self.base.columns]
         return np.concatenate([inertial, 2 * self.noise, 2 * self.noise])

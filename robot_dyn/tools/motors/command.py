@@ -30,7 +30,7 @@ _RUNS = ".toml", ".npz"
 
 @command("Dynamics")
 def budget(
-    what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    source: Annotated[str, typer.Argument(autocompletion=completion.robots)],
     plan: str | None = None,
     /,
     payload: Payloads = None,
@@ -54,7 +54,7 @@ def budget(
     Show torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
 
     Options:
-        what (ROBOT|SCENE.toml|RUN.npz): A robot, with a plan; a scene, which is simulated; or a run file.
+        source (ROBOT|SCENE.toml|RUN.npz): A robot, with a plan; a scene, which is simulated; or a run file.
         plan ([PLAN.csv]): Way points or samples: a column t in s, and one for each joint.
         limits (MOTORS.csv): Motors: joint, peak, continuous, speed, gear_ratio, …, with units; else the
             robot's file.
@@ -69,7 +69,7 @@ def budget(
     """
     from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
-    paths = results.files(MotorBudget, what, plan, limits)
+    paths = results.files(MotorBudget, source, plan, limits)
     if fraction is not None and not fastest:
         raise QueryError("--fraction is for the fastest motion: add --fastest, or remove --fraction")
     if time is not None and period is not None:
@@ -81,14 +81,14 @@ def budget(
         "--ends": ends,
         **options.stated,
     }  # fmt: skip
-    if what.lower().endswith(_RUNS):
+    if source.lower().endswith(_RUNS):
         if unused := [name for name, value in of_robots.items() if value]:
-            raise QueryError(f"{unused[0]} is for a robot with a plan; a scene or a run has its own, so remove it")
-        result = rd.tools.motors.budget(_run(what), motors=motors)
+            raise QueryError(f"{unused[0]} applies to a robot with a plan; a scene or a run has its own, so remove it")
+        result = rd.tools.motors.budget(_run(source), motors=motors)
     else:
         if plan is None:
-            raise QueryError(f"{what}: give a motion as well, a CSV file with a column t [s] and one for each joint")
-        robot = options.load(what)
+            raise QueryError(f"{source}: give a motion as well, a CSV file with a column t [s] and one for each joint")
+        robot = options.load(source)
         times = time if period is None else period
         columns = arguments.pairs("--joint", joint, "JOINT=COLUMN") or None
         motion = rd.control.from_samples(robot, plan, time=times, joints=columns, unit=unit, ends=ends)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, final
@@ -20,6 +20,11 @@ _SAME_ROTOR = 0.01  # largest relative difference of inertias
 _BEYOND = 1e-9  # [rad] or [m]: rounding by which a position may exceed its limit
 
 
+def _positive(unit: str) -> Mapping[str, object]:
+    """Return the declaration of a positive limit, inf for none."""
+    return coefficient(unit, exclusive_minimum=0, infinite=True, fill_value=inf)
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Limits:
@@ -32,10 +37,10 @@ class Limits:
         continuous: Root mean square of τ, in [N m] or [N].
     """
 
-    effort: Any = field(default=inf, metadata=coefficient("N m", least=0, infinite=True, elsewhere=inf))
-    velocity: Any = field(default=inf, metadata=coefficient("rad/s", above=0, infinite=True, elsewhere=inf))
-    acceleration: Any = field(default=inf, metadata=coefficient("rad/s^2", above=0, infinite=True, elsewhere=inf))
-    continuous: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
+    effort: Any = field(default=inf, metadata=coefficient("N m", minimum=0, infinite=True, fill_value=inf))
+    velocity: Any = field(default=inf, metadata=_positive("rad/s"))
+    acceleration: Any = field(default=inf, metadata=_positive("rad/s^2"))
+    continuous: Any = field(default=inf, metadata=_positive("N m"))
 
     def __post_init__(self) -> None:
         check_coefficients(self, PlanError, allow_unresolved=True)

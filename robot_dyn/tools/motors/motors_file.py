@@ -70,7 +70,7 @@ def read_motors(path: str | Path) -> Motors:
     heads = _heads(path, next(lines)[1])
     rows = [_row(where, heads, line) for where, line in lines]
     if not rows:
-        raise PlanError(f"{path}: names no motor; write a line for each joint")
+        raise PlanError(f"{path}: contains no motors; add a line for each joint")
     names = [row["joint"] for row in rows]
     if twice := next((name for k, name in enumerate(names) if name in names[:k]), None):
         raise PlanError(f"{path}: joint {shorten(twice)!r} appears twice; keep one line")
@@ -90,8 +90,8 @@ def _heads(path: str | Path, heads: Sequence[str]) -> dict[str, float]:
         if name not in _UNITS or name in factors:
             raise PlanError(f"{path}: column {shorten(head)!r} is unknown or repeated; {nearest(name, _UNITS)}")
         if unit not in _UNITS[name]:
-            listed = ", ".join(f"[{valid}]" for valid in _UNITS[name])
-            raise PlanError(f"{path}: the unit of {name} must be one of {listed}, got {shorten(head)!r}")
+            listed = "' or '".join(f"{name} [{valid}]" if valid else name for valid in _UNITS[name])
+            raise PlanError(f"{path}: column {shorten(head)!r} has no valid unit: write '{listed}'")
         factors[name] = _UNITS[name][unit]
     for needed in ("joint", "peak", *(("at",) if "gear_ratio" in factors else ())):
         if needed not in factors:

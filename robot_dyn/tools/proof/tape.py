@@ -14,8 +14,7 @@ from typing import Any, Protocol, TypeVar, final
 import casadi as ca
 from flint import arb, ctx
 
-from robot_dyn.codegen import program_of
-from robot_dyn.codegen.program import Kind, Program
+from robot_dyn.codegen import Kind, Program, program_of
 from robot_dyn.foundations import ProofError
 from robot_dyn.lagrange import composite_body
 from robot_dyn.tools.proof.motion import Bodies, Motion

@@ -21,7 +21,7 @@ from flint import arb
 from robot_dyn.codegen.trace.condition import Node
 from robot_dyn.foundations import Arithmetic, Array, Ball
 
-BITS = 400  # of the constants, whose rounding is negligible
+BITS = 400  # precision of the constants, whose rounding is negligible
 BALLS = Ball(BITS)
 
 

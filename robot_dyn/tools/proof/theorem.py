@@ -208,7 +208,7 @@ class Proof(Answer, Value):
     def _claim(self) -> str:
         if not self.until_s:
             return "nothing is proven."
-        return f"the motion exists and is unique for 0 ≤ t ≤ {self.until_s!r} s, and its end lies within"
+        return f"the motion exists and is unique for 0 ≤ t ≤ {self.until_s!r} s, and its final state lies within"
 
 
 def _far(ball: Any, x: float) -> float:

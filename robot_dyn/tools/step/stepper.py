@@ -198,11 +198,11 @@ class Stepper:
             QueryError: If the action has another shape or is not finite, or a lane was never reset.
         """
         if not self._started.all():
-            raise QueryError(f"step: lane {int(np.argmin(self._started))} has no state yet; reset it, or all, first")
+            raise QueryError(f"step: lane {int(np.argmin(self._started))} has not been reset; call reset first")
         names, lanes = self._labels, self._lanes
         rows = shaped("action", action, names)
         if rows.shape != (self._n, len(names)):
-            raise QueryError(f"action must have shape ({self._n}, {len(names)}), one row by lane; got {rows.shape}")
+            raise QueryError(f"action must have shape ({self._n}, {len(names)}), one row per lane; got {rows.shape}")
         if not np.isfinite(rows).all():
             rows = np.where(lanes.ended[:, None], 0.0, rows)
             if len(wrong := np.argwhere(~np.isfinite(rows))):

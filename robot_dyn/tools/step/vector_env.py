@@ -118,7 +118,7 @@ class VectorEnv(vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             actions: Numbers from −1 to 1, (n, k).
 
         Returns:
-            Observations (n, m), rewards, terminations and truncations (n,), and a dictionary: "diverged", (n,), and
+            Observations (n, m), rewards, terminations and truncations (n,), and a dictionary with "diverged", (n,), and
             "energy_residual" in [J], (n,), of a stepper with a ledger.
 
         Raises:

@@ -48,7 +48,7 @@ _RANGE, _SHARP = (1.0, 1e5), 1e-3  # range of ω, in [rad/s], and its relative t
 _LOOKS = 50  # number of states in the search for the tip
 _HOLD_S = 0.05  # duration of a run that holds a payload
 _SPEED = 1.0  # [rad/s] or [m/s], for joints without a velocity limit
-_NO_TORQUE = "it has no torque on any joint with a limit"
+_NO_TORQUE = "it exerts no torque on a joint with a limit"
 
 
 def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, budget: Budget) -> Limit:
@@ -157,7 +157,7 @@ def _tip(robot: Robot, states: Batch) -> str:
     return max(robot.frame_names, key=torque)
 
 
-def held(robot: Robot, q: np.ndarray, gains: Gains, rate: float) -> Setup:
+def holding_setup(robot: Robot, q: np.ndarray, gains: Gains, rate: float) -> Setup:
     """Return a setup that holds the arm at rest at q, for 400 times 1/rate, with the rate of its fastest motion."""
     effects = [ViscousFriction(robot.damping)] if np.any(robot.damping) else []
     law = PDGravity(robot, hold(q), kp=gains[0], kd=gains[1])
@@ -208,7 +208,7 @@ def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: i
             return replace(limit, joint="", within=within, confirmed=holds, setups=(setup,))
         if iterates:
             setup = replace(setup, duration_s=_STEPS * limit.value)
-            limit = replace(limit, what=f"{name}, where the iteration of its stages begins to fail")
+            limit = replace(limit, description=f"{name}, where the iteration of its stages begins to fail")
         setups = tuple(replace(setup, step_s=part * limit.value) for part in (_WITHIN, _BEYOND))
         within, beyond = run_from_near(setups[0], at, budget), run_from_near(setups[1], at, budget, not iterates)
     except RobotDynError as error:
@@ -353,7 +353,11 @@ def run_from_near(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool 
     late = off[run.t >= run.t[-1] / 2]
     finished = run.outcome.ending is Ending.FINISHED and bool(np.isfinite(late).all())
     growth = float(late.max() / np.linalg.norm((setup.q0 - at) * units)) if finished else inf
-    how = f"the push grew {growth:.2g}-fold" if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
+    how = (
+        f"a perturbation grew by a factor of {growth:.2g}"
+        if finished
+        else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
+    )
     report = says(run)
     estimated = 0.0 if run.error is None else run.error.largest
     silent = not report and estimated < LEAST * float(np.abs(run.q - at).max())

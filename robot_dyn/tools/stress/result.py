@@ -18,10 +18,10 @@ _TABLES = {  # by title, the findings in a table and their attributes
         "worst",
         ("quantity", "joint", "typical", "random", "searched", "minimal", "unit", "note", "is_worse_than_random"),
     ),
-    "limits": ("limits", ("kind", "what", "joint", "value", "unit", "within", "beyond", "confirmed")),
+    "limits": ("limits", ("kind", "description", "joint", "value", "unit", "within", "beyond", "confirmed")),
     "random runs: errors of q in rad or m": (
         "runs",
-        ("what", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
+        ("description", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
     ),
 }
 _HEADINGS: dict[str, str] = {
@@ -80,7 +80,7 @@ class Limit:
 
     Attributes:
         kind: "step", "gain", "speed" or "payload".
-        what: Description of the failure.
+        description: Description of the failure.
         joint: Name of the failing joint, or empty.
         value: The limit; inf without one.
         unit: Unit of the limit.
@@ -92,7 +92,7 @@ class Limit:
     """
 
     kind: str
-    what: str
+    description: str
     joint: str
     value: float
     unit: str
@@ -109,7 +109,7 @@ class JudgedRun:
     """A random run whose error estimate was compared with a more accurate run.
 
     Attributes:
-        what: Effects, control and method.
+        description: Effects, control and method.
         duration_s: Duration, in [s].
         estimated: Estimated error of q, in [rad] or [m]; nan without an estimate.
         true: Largest distance from the more accurate run, up to the end of the estimate.
@@ -119,7 +119,7 @@ class JudgedRun:
         setup: Setup of the run.
     """
 
-    what: str
+    description: str
     duration_s: float
     estimated: float
     true: float
@@ -180,8 +180,14 @@ class Stress(Result):
         refuted = (limit for limit in self.limits if limit.confirmed is False)
         misleading = (run for run in self.runs if run.misleads)
         return (
-            *(f"{x.kind} {x.what}: {x.value:.4g} [{x.unit}] is refuted: {x.within}; {x.beyond}" for x in refuted),
-            *(f"run, {x.what}: estimated {x.estimated:.1e}, true {x.true:.1e}, without a warning" for x in misleading),
+            *(
+                f"{x.kind} {x.description}: {x.value:.4g} [{x.unit}] is refuted: {x.within}; {x.beyond}"
+                for x in refuted
+            ),
+            *(
+                f"run, {x.description}: estimated {x.estimated:.1e}, true {x.true:.1e}, without a warning"
+                for x in misleading
+            ),
         )
 
     @reported

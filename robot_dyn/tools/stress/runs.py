@@ -114,11 +114,11 @@ def judged_runs(
         if scene is None:
             continue
         setup, what = scene
-        run = work.do(f"run {k}, {what}", partial(judged, setup, what))
+        run = work.do(f"run {k}, {what}", partial(compared_run, setup, what))
         yield shrunk_run(run, f"shrinking of run {k}", work) if run is not None and run.misleads else run
 
 
-def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
+def compared_run(setup: Setup, description: str, budget: Budget) -> JudgedRun:
     """Compare a run with two better ones.
 
     Raises:
@@ -129,19 +129,19 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     finished, error = run.outcome.ending is Ending.FINISHED, run.error
     report = says(run) if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     if error is None or not finished or not error.until_s:
-        return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
+        return JudgedRun(description, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, method=_BETTER[0])
     better = [simulate(replace(sure, method=integrator), on_progress=budget.check) for integrator in _BETTER]
     if any(x.outcome.ending is not Ending.FINISHED for x in better):
-        raise RobotDynError("a better run did not finish")
+        raise RobotDynError("a more accurate run did not finish")
     if any(x.t.shape != run.t.shape or np.abs(x.t - run.t).max() > _ONE_TIME for x in better):
-        raise RobotDynError("the better runs have other samples")
+        raise RobotDynError("the more accurate runs have other sample times")
     covered, estimate = run.t <= error.until_s, error.at(error.until_s)
     true, unsure = (float(np.abs(q - better[0].q)[covered].max()) for q in (run.q, better[1].q))
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
     warns = bool(error.note) or "does not close" in run.summary
     misleads = not warns and max(estimate, floor) < LEAST * max(true, floor)
-    return JudgedRun(what, setup.duration_s, estimate, true, unsure, report or str(error), misleads, setup)
+    return JudgedRun(description, setup.duration_s, estimate, true, unsure, report or str(error), misleads, setup)
 
 
 def shrunk_run(run: JudgedRun, name: str, work: Work) -> JudgedRun:
@@ -152,7 +152,7 @@ def shrunk_run(run: JudgedRun, name: str, work: Work) -> JudgedRun:
         nonlocal small
         q0, v0 = np.split(x, 2)
         try:
-            young = judged(replace(run.setup, q0=q0, v0=v0), run.what, budget)
+            young = compared_run(replace(run.setup, q0=q0, v0=v0), run.description, budget)
         except RobotDynError:
             return False
         small = young if young.misleads else small

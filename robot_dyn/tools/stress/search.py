@@ -11,7 +11,7 @@ from robot_dyn import Robot
 from robot_dyn.accuracy import random_states, warn_below
 from robot_dyn.foundations import function, instance, integer, number
 from robot_dyn.report import INTERRUPTED, Budget, processor_and_versions
-from robot_dyn.tools.stress.limits import gain_limit, held, payload_limit, speed_limit, step_limits
+from robot_dyn.tools.stress.limits import gain_limit, holding_setup, payload_limit, speed_limit, step_limits
 from robot_dyn.tools.stress.result import Finding, JudgedRun, Limit, Stress, WorstCase
 from robot_dyn.tools.stress.runs import judged_runs
 from robot_dyn.tools.stress.work import Work
@@ -97,7 +97,7 @@ def _findings(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> I
     yield work.do("payload", lambda budget: payload_limit(robot, states, streams[3], gains, budget))
     if gains is not None and fastest is not None:
         at, rate = np.array(fastest.state["q"]), fastest.minimal
-        setup = work.do("start of steps and gain", lambda _: held(robot, at, gains, rate), HELD)
+        setup = work.do("start of steps and gain", lambda _: holding_setup(robot, at, gains, rate), HELD)
     if setup is not None:
         yield from step_limits(setup, seed, work)
         yield work.do("largest gain", lambda budget: gain_limit(setup, seed, budget))

@@ -234,7 +234,7 @@ def _lost(
 
     def losses(batch: Batch) -> np.ndarray:
         state = {name: batch[name][0] for name in quantity.arguments}
-        return np.array([_OF_FLOAT64 - digits_of(digit_count.judged(implementation, quantity, state))])
+        return np.array([_OF_FLOAT64 - digits_of(digit_count.error_at(implementation, quantity, state))])
 
     counts = [digit_count.count(implementation, quantity, budget.check)]
     while counts[-1].searched >= counts[-1].random and len(counts) < _ROUNDS:

@@ -19,7 +19,7 @@ ACTIONS = ("run", "status", "verify", "report", "export")
 
 @command("Simulation")
 def sweep(
-    what: str,
+    scene_or_action: str,
     folder: str | None = None,
     /,
     output: str | None = None,
@@ -46,7 +46,7 @@ def sweep(
     table as .csv or .parquet.
 
     Options:
-        what (SCENE.toml|ACTION): A scene to sweep; or run, status, verify, report, export of a FOLDER.
+        scene_or_action (SCENE.toml|ACTION): A scene to sweep; or run, status, verify, report, export of a FOLDER.
         folder (FOLDER): Folder of a sweep, for an action.
         output (PATH): Folder to fill; or the file of report, export.
         runs: Number of runs.
@@ -68,21 +68,22 @@ def sweep(
     verified: list[str] = []
     figures = arguments.pairs("--figure", figure)
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "job": job}
-    if what.lower().endswith(".toml"):
+    if scene_or_action.lower().endswith(".toml"):
         if folder is not None or output is None:
-            raise SweepError("give the folder to fill with -o FOLDER")
+            raise SweepError("give the output folder with -o FOLDER")
         settings = {"runs": runs, "design": design, "seed": seed, "samples": samples}
         changes: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
         changes |= {"uncut": True} if uncut else {}
-        stated = sw.from_scene(what, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
+        stated = sw.from_scene(scene_or_action, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
         result = _run(stated, output, options | {"chunk": chunk})
     else:
-        if what not in ACTIONS:
+        if scene_or_action not in ACTIONS:
             raise SweepError(
-                f"{what!r} is neither a scene, which ends with .toml, nor an action; {nearest(what, ACTIONS)}"
+                f"{scene_or_action!r} is neither a scene, which ends with .toml, nor an action;"
+                f" {nearest(scene_or_action, ACTIONS)}"
             )
         if folder is None:
-            raise SweepError(f"{what}: give the folder of a sweep, robot-dyn sweep {what} FOLDER")
+            raise SweepError(f"{scene_or_action}: give the folder of a sweep, robot-dyn sweep {scene_or_action} FOLDER")
         of_scenes = {
             "--runs": runs, "--vary": vary, "--samples": samples, "--design": design, "--seed": seed, "--chunk": chunk,
             "--uncut": uncut or None,
@@ -93,20 +94,20 @@ def sweep(
                 " its scene into another folder: robot-dyn sweep SCENE.toml … -o FOLDER"
             )
         result = sw.read_sweep(folder, scene, figures)
-        if what == "run":
+        if scene_or_action == "run":
             result = _run(result.sweep, folder, options)
-        elif what == "verify":
+        elif scene_or_action == "verify":
             verified = [f"all rows: SHA-256 {result.verify()}"]
             verified += [f"{count} chunks by {name}" for name, count in result.processors.items()]
-        elif what in ("report", "export"):
-            path = Path(output or f"{folder.rstrip('/')}.{'html' if what == 'report' else 'csv'}")
+        elif scene_or_action in ("report", "export"):
+            path = Path(output or f"{folder.rstrip('/')}.{'html' if scene_or_action == 'report' else 'csv'}")
             to_stderr(f"written: {result.save(path, force=force)}")
     answers = [result.probability(event) for event in probability or ()] if not result.status["missing"] else []
     if as_json:
         say_json(result, probabilities=dict(zip(probability or (), answers, strict=False)))
     else:
         say(result, *verified, *answers)
-    if result.status["missing"] and what != "status" and job is None:
+    if result.status["missing"] and scene_or_action != "status" and job is None:
         raise typer.Exit(130)
 
 

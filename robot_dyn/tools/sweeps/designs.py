@@ -73,12 +73,12 @@ def design(name: ArrayLike, runs: int, dimensions: int, seed: int = 0) -> Design
     """
     runs = integer("runs", runs, least=1, most=MOST_ROWS, error=SweepError)
     if isinstance(name, np.ndarray | list | tuple):
-        return given(name, runs, dimensions)
+        return from_table(name, runs, dimensions)
     name = choice("design", name, NAMES, error=SweepError)
     return _design(name, _drawn(name, runs, dimensions, seed))
 
 
-def given(table: ArrayLike, runs: int, dimensions: int, name: str = "table") -> Design:
+def from_table(table: ArrayLike, runs: int, dimensions: int, name: str = "table") -> Design:
     """Return the design of a table of rows; raise a SweepError unless it has N rows of d numbers in [0, 1)."""
     rows = numbers("the table of a design", table, ("N", "d"), error=SweepError, least=0.0)
     if (rows >= 1).any():

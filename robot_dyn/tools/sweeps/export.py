@@ -45,7 +45,7 @@ def _write(sweep: Sweep, folder: Folder, stream: BinaryIO, is_csv: bool) -> None
     stated = pa.schema(fields, metadata=metadata)
     with _writer(stream, stated, is_csv) as writer:
         for chunk in range(folder.count):
-            rows = folder.read(chunk) | {"run": np.arange(*folder.of(chunk))}
+            rows = folder.read(chunk) | {"run": np.arange(*folder.run_range(chunk))}
             rows |= {name: np.array(list(map(cell, rows[name])), object) for name in TEXTS}
             writer.write_table(pa.table([rows[name] for name in of_files.names], stated))
 

@@ -91,7 +91,7 @@ class Expression:
         """Names of the required columns."""
         return tuple(dict.fromkeys(value for value in self._operands.values() if isinstance(value, str)))
 
-    def of(self, columns: Mapping[str, np.ndarray]) -> Truth:
+    def evaluate(self, columns: Mapping[str, np.ndarray]) -> Truth:
         """Evaluate the event in each run; raise a SweepError if a name is not a column."""
         for name in self.names:
             if name not in columns:

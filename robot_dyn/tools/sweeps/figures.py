@@ -162,60 +162,60 @@ class Figure(Value):
 
     Attributes:
         name: "rms_tracking_error", "peak" or "final".
-        of_what: "q", "v", "u" or "tracking_error".
+        quantity: "q", "v", "u" or "tracking_error".
         joint: Name of a joint, or None for all joints.
     """
 
     name: str
-    of_what: str
+    quantity: str
     joint: str | None = None
 
     def __post_init__(self) -> None:
-        choice(self.name, self.of_what, (*_STATES, "tracking_error"), error=SweepError)
+        choice(self.name, self.quantity, (*_STATES, "tracking_error"), error=SweepError)
         if self.joint is not None and not isinstance(self.joint, str):
             raise SweepError(f"{self.name}: joint must be the name of a joint, got {shown(self.joint)}")
 
     @property
     def record(self) -> tuple[str, ...]:
         """Quantities to record, some of "q", "v", "u", "energy", "work"."""
-        if self.of_what == "tracking_error":
+        if self.quantity == "tracking_error":
             return ("q",)
-        return ("q", self.of_what) if self.name == "final" else ()  # q shows where a run ends
+        return ("q", self.quantity) if self.name == "final" else ()  # q shows where a run ends
 
     def unit(self, setup: Setup) -> str:
         """Return the unit of the numbers; empty if unknown, "m" for the error of a frame that follows a path."""
-        is_error, controller, dynamics = self.of_what == "tracking_error", setup.controller, setup.plant.dynamics
+        is_error, controller, dynamics = self.quantity == "tracking_error", setup.controller, setup.plant.dynamics
         if is_error and controller is not None and isinstance(controller.desired, CartesianReference):
             return "m"
         types = dict(zip(dynamics.joint_names, joint_types_of(dynamics), strict=True))
         joint_types = types.values() if self.joint is None else [types.get(self.joint)]
-        return joint_units("q" if is_error else self.of_what, joint_types)
+        return joint_units("q" if is_error else self.quantity, joint_types)
 
-    def of(self, runs: Runs) -> np.ndarray:
+    def values(self, runs: Runs) -> np.ndarray:
         """Compute the numbers of finished runs, (B,)."""
-        if self.of_what != "tracking_error" and self.name == "peak":
-            extremes = runs.extremes[:, _STATES.index(self.of_what)]
+        if self.quantity != "tracking_error" and self.name == "peak":
+            extremes = runs.extremes[:, _STATES.index(self.quantity)]
             return np.abs(runs.of_joint(extremes, self.joint)).max(axis=(1, 2))
-        if self.of_what == "tracking_error" and runs.tracking_error is None:
+        if self.quantity == "tracking_error" and runs.tracking_error is None:
             raise SweepError(
                 f"{self.name}: there is no tracking error without a reference; add a controller with a reference"
             )
         x = runs.of_joint(
-            runs.tracking_error if self.of_what == "tracking_error" else getattr(runs, self.of_what), self.joint
+            runs.tracking_error if self.quantity == "tracking_error" else getattr(runs, self.quantity), self.joint
         )
         if self.name == "peak":
             return np.abs(np.where(runs.known[..., None], x, 0.0)).max(axis=(1, 2))
         if self.name == "rms_tracking_error":
             return _root_mean_square(x, runs.known)
         last = x[np.arange(len(runs)), runs.known.sum(axis=1) - 1]
-        if self.of_what != "tracking_error" and last.shape[1] > 1:
+        if self.quantity != "tracking_error" and last.shape[1] > 1:
             names = ", ".join(runs.joint_names)
-            raise SweepError(f"final({self.of_what!r}) needs a joint; give joint=, one of {names}")
-        return np.abs(last).max(axis=1) if self.of_what == "tracking_error" else last[:, 0]
+            raise SweepError(f"final({self.quantity!r}) needs a joint; give joint=, one of {names}")
+        return np.abs(last).max(axis=1) if self.quantity == "tracking_error" else last[:, 0]
 
     def to_dict(self) -> dict[str, object]:
         """Return name and arguments, for JSON."""
-        quantity: dict[str, object] = {} if self.name == "rms_tracking_error" else {"of_what": self.of_what}
+        quantity: dict[str, object] = {} if self.name == "rms_tracking_error" else {"quantity": self.quantity}
         return {"figure": self.name, **quantity, "joint": self.joint}
 
     def __str__(self) -> str:
@@ -266,7 +266,7 @@ class UserFigure(Value):
         """Return the unit that the function states; empty if it states none."""
         return str(getattr(self.function, "unit", "")) if self.stated is None else self.stated[1]
 
-    def of(self, runs: Runs) -> np.ndarray:
+    def values(self, runs: Runs) -> np.ndarray:
         """Compute the numbers of finished runs, (B,); raise a SweepError if the function does not return a number."""
         values = list(map(self.function, runs))
         for value in values:
@@ -291,17 +291,17 @@ def rms_tracking_error(joint: str | None = None) -> Figure:
     return Figure("rms_tracking_error", "tracking_error", joint)
 
 
-def peak(of_what: str, joint: str | None = None) -> Figure:
+def peak(quantity: str, joint: str | None = None) -> Figure:
     """Return the figure: largest |q|, |v| or |u| over all steps, or largest tracking error over the samples.
 
     It is of one joint, or of all joints by default.
     """
-    return Figure("peak", of_what, joint)
+    return Figure("peak", quantity, joint)
 
 
-def final(of_what: str, joint: str | None = None) -> Figure:
+def final(quantity: str, joint: str | None = None) -> Figure:
     """Return the figure: last "q", "v" or "u" of a joint, or largest absolute last "tracking_error" over the joints."""
-    return Figure("final", of_what, joint)
+    return Figure("final", quantity, joint)
 
 
 FIGURES: Mapping[str, Callable[..., Figure]] = {

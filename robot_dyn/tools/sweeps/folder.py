@@ -72,7 +72,7 @@ class Folder:
         """Number of chunks."""
         return -(-self.runs // self.chunk)
 
-    def of(self, chunk: int) -> tuple[int, int]:
+    def run_range(self, chunk: int) -> tuple[int, int]:
         """Return the first run of a chunk, and the run after its last."""
         return chunk * self.chunk, min((chunk + 1) * self.chunk, self.runs)
 
@@ -125,7 +125,7 @@ class Folder:
     ) -> None:  # fmt: skip
         """Write a chunk, its samples first; raise a SweepError, with existing files unchanged, if that fails."""
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
-        start, stop = self.of(chunk)
+        start, stop = self.run_range(chunk)
         footer = {
             "sweep": self.digest,
             "chunk": chunk,
@@ -156,20 +156,20 @@ class Folder:
         save(self.path / UNCUT, lambda stream: stream.write(text.encode()), SweepError)
 
     def comparison(self) -> Comparison | None:
-        """Return the comparison of an uncut sweep, None if it was not made; raise a SweepError if it is damaged."""
+        """Return the comparison of an uncut sweep, None if there is none; raise a SweepError if it is damaged."""
         file, again = self.path / UNCUT, "remove this file, and run the sweep again, which compares the runs again"
         if not file.exists():
             return None
         try:
             stored = json.loads(read(file, _MOST_COMPARISON, SweepError, again))
             if stored["sweep"] != self.digest:
-                raise SweepError(f"{file}: is of another sweep; {again}")
+                raise SweepError(f"{file}: belongs to another sweep; {again}")
             return TypeAdapter(Comparison).validate_python(stored["comparison"])
         except (ValueError, TypeError, KeyError) as error:
             raise SweepError(f"{file}: is not the comparison of an uncut sweep ({shown(error)}); {again}") from None
 
     def one_by_one(self) -> OneByOne:
-        """Return how many runs of the present chunks were made one by one, and how long that took."""
+        """Return the number of runs of the present chunks that were simulated one by one, and their time."""
         chunks = np.flatnonzero(self.present()).tolist()
         return sum((OneByOne(**self.footer(chunk)["one_by_one"]) for chunk in chunks), IN_LOCK_STEP)
 
@@ -203,7 +203,7 @@ class Folder:
         names = list(dict.fromkeys(names))
         columns = {name: np.empty(self.runs, type_of(name)) for name in names}
         for chunk in range(self.count):
-            start, stop = self.of(chunk)
+            start, stop = self.run_range(chunk)
             for name, x in self._read(chunk, names)[0].items():
                 columns[name][start:stop] = x
         return columns
@@ -220,12 +220,12 @@ class Folder:
                 raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
 
     def _parsed(self, file: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
-        start, stop = self.of(chunk)
+        start, stop = self.run_range(chunk)
         footer = json.loads(file.schema_arrow.metadata[_FOOTER])
         if footer["sweep"] != self.digest:
-            raise _DamagedError("is of another sweep")
+            raise _DamagedError("belongs to another sweep")
         if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, start, stop):
-            raise _DamagedError("is of other runs than its name says")
+            raise _DamagedError("contains other runs than its name states")
         if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
             raise _DamagedError("its footer lacks digests of rows and samples")
         TypeAdapter(OneByOne).validate_python(footer["one_by_one"])
@@ -277,7 +277,7 @@ def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(_UNFINISHED)}
     strange = sorted(name for name in names if not name.startswith("design-"))
     if strange and FILE not in names:
-        raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
+        raise SweepError(f"{path}: contains other files, such as {strange[0]}; give a new folder")
     write_design(path, rows, stated.rows_sha256)
     own = path / f".{FILE}.{os.urandom(8).hex()}{_UNFINISHED}"
     save(own, lambda stream: stream.write(stated.text.encode()), SweepError)

@@ -46,11 +46,11 @@ def named(scene: object, figures: object) -> Named:
     return Named(None if scene is None else source_of(scene), paths)
 
 
-def by_name(what: str, given: object, example: str) -> dict[str, object]:
+def by_name(label: str, functions: object, example: str) -> dict[str, object]:
     """Return distributions, figures or functions by name; raise a SweepError unless they are a mapping."""
-    if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
-        raise SweepError(f"{what}: give them by name, as {{{example!r}: …}}, got {shown(given)}")
-    return dict(given)
+    if not isinstance(functions, Mapping) or not all(isinstance(name, str) and name for name in functions):
+        raise SweepError(f"{label}: give them by name, as {{{example!r}: …}}, got {shown(functions)}")
+    return dict(functions)
 
 
 def source_of(scene: object) -> str:

@@ -21,6 +21,7 @@ from robot_dyn.foundations import (
     choice,
     integer,
     nearest,
+    needs,
     reported,
     save,
     target,
@@ -43,7 +44,7 @@ from robot_dyn.tools.sweeps.work import OneByOne, Work
 _SHOWN = 5  # number of listed reasons
 _WORST = 10  # number of runs in a report
 _PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
-_GIVEN = "finished", "known"
+_CONDITIONS = "finished", "known"
 
 
 @final
@@ -90,12 +91,25 @@ class SweepResult(Answer):
         table["run"] = np.arange(self.sweep.runs)
         return {name: table[name] for name in names}
 
+    def to_pandas(self, *names: str) -> Any:
+        """Return `table` as a `pandas.DataFrame` with the number of the run as its index.
+
+        Args:
+            *names: Columns, by default all.
+
+        Raises:
+            MissingExtraError: Without pandas: pip install 'robot-dyn[sweeps]'.
+            SweepError: If a column is unknown, or chunks are missing.
+        """
+        frame = needs("pandas", extra="sweeps").DataFrame(self.table(*names))
+        return frame.set_index("run") if "run" in frame else frame.rename_axis("run")
+
     def quantiles(
         self,
         figure: str,
         probabilities: Sequence[float] | float = (0.05, 0.5, 0.95),
         level: float = 0.95,
-        given: str | None = None,
+        condition: str | None = None,
     ) -> tuple[Estimate, ...]:
         """Estimate quantiles of a figure with intervals; a failed run without a value counts as +∞.
 
@@ -103,24 +117,24 @@ class SweepResult(Answer):
             figure: Name of the figure, or of another column.
             probabilities: Probabilities of the quantiles, in (0, 1).
             level: Confidence level of the intervals.
-            given: "finished" for finished runs only, "known" for runs with a value only.
+            condition: "finished" for finished runs only, "known" for runs with a value only.
 
         Raises:
-            SweepError: If an argument is invalid, or a finished run has no value and `given` is not "known".
+            SweepError: If an argument is invalid, or a finished run has no value and `condition` is not "known".
         """
-        x, keep, failed = self._values(figure, given)
+        x, keep, failed = self._values(figure, condition)
         x = np.where(np.isnan(x), np.inf, x)[keep]
         estimates = statistics.quantiles(x, probabilities, level, self._scrambling(keep), failed=failed)
-        return tuple(self._named(estimate, figure, given) for estimate in estimates)
+        return tuple(self._named(estimate, figure, condition) for estimate in estimates)
 
-    def probability(self, event: str, level: float = 0.95, given: str | None = None) -> Estimate:
+    def probability(self, event: str, level: float = 0.95, condition: str | None = None) -> Estimate:
         """Estimate the probability of an event, such as "diverged | error > 0.1", with an interval.
 
         Args:
             event: Names of columns and outcomes, numbers, comparisons, | & ! and parentheses. "failed" means that a run
                 diverged or raised.
             level: Confidence level of the interval.
-            given: "finished" for finished runs only, "known" for runs in which the event is known only.
+            condition: "finished" for finished runs only, "known" for runs in which the event is known only.
 
         Raises:
             SweepError: If the event is unknown in a run, because a figure has no value.
@@ -128,31 +142,31 @@ class SweepResult(Answer):
         self._check_complete()
         truth, failed = self._happened(event), self._failed
         known = truth.certain == truth.possible
-        keep = _some(self._included(known, given), given)
+        keep = _some(self._included(known, condition), condition)
         if (unknown := ~known & keep).any():
-            remedy = f"write 'failed | {event}', or pass given='finished'"
+            remedy = f"write 'failed | {event}', or pass condition='finished'"
             if (unknown & ~failed).any():
-                remedy = "some finished, but have no figure: pass given='known'"
+                remedy = "some finished, but have no figure: pass condition='known'"
             raise SweepError(
                 f"{event!r} is unknown in {int(unknown.sum())} runs, such as run {int(unknown.argmax())}: {remedy}"
             )
         count = int((failed & keep).sum())
         estimate = statistics.probability(truth.certain[keep], level, self._scrambling(keep), failed=count)
-        return replace(estimate, statistic=f"probability of {event}{_among(given)}")
+        return replace(estimate, statistic=f"probability of {event}{_among(condition)}")
 
-    def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
-        """Estimate the mean of a figure with an interval; `given`, see `quantiles`, is needed if runs have no value."""
-        x, keep, failed = self._values(figure, given, "mean")
+    def mean(self, figure: str, level: float = 0.95, condition: str | None = None) -> Estimate:
+        """Estimate the mean of a figure, with an interval; runs without a value need `condition`, see `quantiles`."""
+        x, keep, failed = self._values(figure, condition, "mean")
         estimate = statistics.mean(x[keep], level, self._scrambling(keep), failed=failed)
-        return self._named(estimate, figure, given)
+        return self._named(estimate, figure, condition)
 
-    def sensitivity(self, figure: str, level: float = 0.95, given: str | None = None) -> Sensitivity:
-        """Compute the sensitivity of a figure to the varying parameters; for `given`, see `mean`.
+    def sensitivity(self, figure: str, level: float = 0.95, condition: str | None = None) -> Sensitivity:
+        """Compute the sensitivity of a figure to the varying parameters; for `condition`, see `mean`.
 
         Design "saltelli" gives first-order and total Sobol' indices, other designs rank correlations and PAWN indices.
         """
         level = statistics.check_level(level)
-        x, keep, failed = self._values(figure, given, "sensitivity")
+        x, keep, failed = self._values(figure, condition, "sensitivity")
         if self.sweep.points.name == "saltelli":
             scrambling = self.sweep.points.scrambling
             indices = saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
@@ -160,17 +174,17 @@ class SweepResult(Answer):
             values = self.folder.columns(self.sweep.columns)
             columns = np.column_stack([values[name] for name in self.sweep.columns])
             indices = by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
-        return replace(indices, figure=heading(self.sweep, figure), given=given)
+        return replace(indices, figure=heading(self.sweep, figure), condition=condition)
 
-    def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
+    def worst(self, figure: str, count: int = 5, condition: str | None = None) -> tuple[int, ...]:
         """Return the numbers of the runs with the largest values of a figure; `run(i)` repeats one.
 
-        Runs without a value come first, in their order, unless `given` excludes them: "finished" excludes failed runs,
-        "known" all runs without a value.
+        Runs without a value come first, in their order, unless `condition` excludes them: "finished" excludes failed
+        runs, "known" all runs without a value.
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
         x = self._figure(figure)
-        keep = self._included(np.isfinite(x), given)
+        keep = self._included(np.isfinite(x), condition)
         runs, x = np.flatnonzero(keep), x[keep]
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
         return tuple(runs[order[:count]].tolist())
@@ -246,12 +260,12 @@ class SweepResult(Answer):
         from robot_dyn.tools.sweeps.report import histogram
 
         label, x = heading(self.sweep, name), self._figure(name)
-        given = "known" if (np.isnan(x) & ~self._failed).any() else None
-        quantiles = self.quantiles(name, _PROBABILITIES, given=given)
+        condition = "known" if (np.isnan(x) & ~self._failed).any() else None
+        quantiles = self.quantiles(name, _PROBABILITIES, condition=condition)
         rows = tuple((x.statistic, *map(number_text, (x.estimate, x.low, x.high))) for x in quantiles)
         first, finite = quantiles[0], x[np.isfinite(x)]
         numbers = "estimate", f"{100 * first.level:g} % interval from", "to"
-        worst = self.worst(name, min(_WORST, len(x)), given="known")
+        worst = self.worst(name, min(_WORST, len(x)), condition="known")
         blocks: list[Block] = [
             Table(("", *numbers), rows, right=numbers),
             f"{first.n} runs, {first.failed} failed",
@@ -261,7 +275,7 @@ class SweepResult(Answer):
             ),
         ]
         try:
-            blocks += self.sensitivity(name, given="known").blocks()
+            blocks += self.sensitivity(name, condition="known").blocks()
         except SweepError as error:  # the figure is the same in all runs
             blocks.append(f"no sensitivity: {error}")
         return label, histogram(label, finite) if len(finite) else "", blocks
@@ -338,7 +352,7 @@ class SweepResult(Answer):
 
     @reported
     def one_by_one(self) -> OneByOne:
-        """Runs made one by one, not in lock step, and their time."""
+        """Runs simulated one by one, not in lock step, and their time."""
         return self.folder.one_by_one()
 
     def reasons(self) -> dict[str, int]:
@@ -378,7 +392,7 @@ class SweepResult(Answer):
         if len(missing := self.missing):
             raise SweepError(
                 f"{self.path}: {len(missing)} of {self.folder.count} chunks are missing, the first is {missing[0]};"
-                " run the sweep again, which only makes missing chunks"
+                " run the sweep again to compute them"
             )
 
     def _figure(self, name: str) -> np.ndarray:
@@ -402,20 +416,20 @@ class SweepResult(Answer):
         columns = self.folder.columns((*numbers.intersection(expression.names), "outcome"))
         outcome = columns.pop("outcome")
         columns |= {name: outcome == name for name in OUTCOMES} | {"failed": outcome != FINISHED}
-        return expression.of(columns)
+        return expression.evaluate(columns)
 
-    def _included(self, known: np.ndarray, given: str | None) -> np.ndarray:
+    def _included(self, known: np.ndarray, condition: str | None) -> np.ndarray:
         """Return True for included runs, (N,): all, finished ones, or finished ones with a known value."""
-        if given is None:
+        if condition is None:
             return np.ones(len(known), bool)
-        return known if choice("given", given, _GIVEN, error=SweepError) == "known" else ~self._failed
+        return known if choice("condition", condition, _CONDITIONS, error=SweepError) == "known" else ~self._failed
 
-    def _values(self, name: str, given: str | None, finite: str = "") -> tuple[np.ndarray, np.ndarray, int]:
+    def _values(self, name: str, condition: str | None, finite: str = "") -> tuple[np.ndarray, np.ndarray, int]:
         """Return a figure of all runs, the included runs, and the number of failed runs.
 
         Args:
             name: Name of the figure.
-            given: Condition on runs; see `quantiles`.
+            condition: Condition on runs; see `quantiles`.
             finite: Name of a statistic that needs finite values; or empty.
 
         Raises:
@@ -423,27 +437,27 @@ class SweepResult(Answer):
         """
         x, failed = self._figure(name), self._failed
         unknown = np.isnan(x)
-        keep = _some(self._included(~unknown, given), given)
+        keep = _some(self._included(~unknown, condition), condition)
         if (none := keep & unknown & ~failed).any():
             raise SweepError(
                 f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: pass"
-                " given='known', which omits them"
+                " condition='known', which omits them"
             )
         if finite and (lost := int((keep & unknown).sum())):
             raise SweepError(
-                f"{lost} of {len(x)} runs failed: for the {finite} of finished runs pass given='finished', of runs with"
-                " a value given='known'"
+                f"{lost} of {len(x)} runs failed: pass condition='finished' for the {finite} of finished runs, or"
+                " condition='known' for that of runs with a value"
             )
         if finite and (infinite := keep & np.isinf(x)).any():
             raise SweepError(
                 f"{name!r} is infinite in {int(infinite.sum())} runs, such as run {int(infinite.argmax())}: it has no"
                 f" {finite}; quantiles and probabilities count it"
             )
-        return x, keep, int((failed & (keep if given is None else ~keep)).sum())
+        return x, keep, int((failed & (keep if condition is None else ~keep)).sum())
 
-    def _named(self, estimate: Estimate, figure: str, given: str | None) -> Estimate:
+    def _named(self, estimate: Estimate, figure: str, condition: str | None) -> Estimate:
         """Add the figure, its unit and the condition on runs to the name of an estimate."""
-        return replace(estimate, statistic=f"{estimate.statistic} of {heading(self.sweep, figure)}{_among(given)}")
+        return replace(estimate, statistic=f"{estimate.statistic} of {heading(self.sweep, figure)}{_among(condition)}")
 
     def _scrambling(self, keep: np.ndarray) -> np.ndarray | None:
         """Return the scrambling of each included run; None for independent runs."""
@@ -451,12 +465,12 @@ class SweepResult(Answer):
         return None if design.independent else design.scrambling[keep]
 
 
-def _some(keep: np.ndarray, given: str | None) -> np.ndarray:
+def _some(keep: np.ndarray, condition: str | None) -> np.ndarray:
     """Return the included runs; raise a SweepError if there are none."""
     if not keep.any():
-        raise SweepError(f"no run is left with given={given!r}; remove it, or see the reasons of failure")
+        raise SweepError(f"no run is left with condition={condition!r}; remove it, or see the reasons of failure")
     return keep
 
 
-def _among(given: str | None) -> str:
-    return "" if given is None else f" given {given}"
+def _among(condition: str | None) -> str:
+    return "" if condition is None else f" given {condition}"

@@ -98,7 +98,7 @@ def run(
 
     def make(number: int, look: Callable[[float], object]) -> None:
         if not store.file(number).exists():  # another driver was first
-            store.write(number, *work.made(*store.of(number), t, look))
+            store.write(number, *work.run_rows(*store.run_range(number), t, look))
 
     with suppress(KeyboardInterrupt):
         if cluster is None:

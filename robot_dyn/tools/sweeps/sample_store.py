@@ -49,7 +49,7 @@ class Samples(Value):
         integer("every", self.every, least=1, most=2**53, error=SweepError)
         truth("failed", self.failed, error=SweepError)
 
-    def of(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
+    def selected(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
         """Return True for runs whose samples are kept, (k,)."""
         return (runs % self.every == 0) & (diverged | (not self.failed))
 
@@ -84,13 +84,13 @@ class SampleStore:
         path: Path of the group.
         runs: Number of runs of the sweep.
         chunk: Number of runs in a shard.
-        kept: The selection of samples.
+        selection: The selection of samples.
     """
 
     path: Path
     runs: int
     chunk: int
-    kept: Samples
+    selection: Samples
 
     def create(self, t: np.ndarray, joint_names: tuple[str, ...]) -> None:
         """Write the descriptions of the arrays, and the times of samples, (m,), unless they exist."""
@@ -99,7 +99,7 @@ class SampleStore:
         zarr = needs("zarr", extra="sweeps")
         memory = zarr.storage.MemoryStore()
         group = zarr.create_group(memory, zarr_format=3, attributes={"joint": list(joint_names)})
-        for name in self.kept.names:
+        for name in self.selection.names:
             self._array(zarr, memory, name, (len(t), len(joint_names)))
         times = group.create_array("t", data=t, dimension_names=("t",), compressors=None)
         times.attrs["units"] = "s"
@@ -143,7 +143,7 @@ class SampleStore:
     def _reading(self) -> Iterator[None]:
         """Raise a SweepError about faulty descriptions of the arrays; Zarr itself would open pipes and devices."""
         remedy = "restore it from a copy of the folder, or run the sweep into a new folder"
-        for name in ("zarr.json", *(f"{array}/zarr.json" for array in ("t", *self.kept.names)), _TIMES):
+        for name in ("zarr.json", *(f"{array}/zarr.json" for array in ("t", *self.selection.names)), _TIMES):
             with reading(self.path / name, SweepError, remedy):
                 pass
         try:
@@ -162,13 +162,13 @@ class SampleStore:
         needs("zarr", extra="sweeps")
         with self._reading():
             data = xarray.open_zarr(self.path, consolidated=False, chunks=None)
-            for name in self.kept.names:
+            for name in self.selection.names:
                 data[name].attrs |= {"units": joint_units(name, joint_types), "long_name": SAMPLED[name].title}
             return data.assign_coords(run=np.arange(self.runs), joint=list(data.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, shape: tuple[int, ...]) -> Any:
         """Create an empty array of the store; a run has the shape (m, n)."""
-        dense = self.kept.every == 1 and not self.kept.failed
+        dense = self.selection.every == 1 and not self.selection.failed
         inner = min(_INNER, self.chunk) if dense and self.chunk % _INNER == 0 else 1
         return zarr.create_array(
             store, name=name, shape=(self.runs, *shape), dtype="float64",

@@ -30,6 +30,6 @@ class SweepTable(Part):
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
     """Seed of the design."""
     uncut: bool = False
-    """Let steps pass thresholds, in lock step; the result compares the figures of 64 runs made both ways."""
+    """Let steps pass thresholds, in lock step; the result compares the figures of 64 runs simulated both ways."""
     samples: str | None = None
     """Samples to keep: `q`, `v` or `u` of all runs, or `samples('q', 'v', every=10, failed=True)`."""

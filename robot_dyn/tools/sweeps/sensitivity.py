@@ -41,7 +41,7 @@ class Sensitivity(Answer):
         method: Method of computation, in words.
         left_out: Number of omitted blocks of design "saltelli", because a run has no value.
         figure: Name of the figure.
-        given: Condition on runs; see `SweepResult.sensitivity`.
+        condition: Condition on runs; see `SweepResult.sensitivity`.
     """
 
     names: tuple[str, ...]
@@ -55,10 +55,11 @@ class Sensitivity(Answer):
     method: str = ""
     left_out: int = 0
     figure: str = ""
-    given: str | None = None
+    condition: str | None = None
 
     def blocks(self) -> Iterator[Block]:
-        title = f"sensitivity{f' of {self.figure}' * bool(self.figure)}{f' given {self.given}' if self.given else ''}"
+        condition = f" given {self.condition}" if self.condition else ""
+        title = f"sensitivity{f' of {self.figure}' * bool(self.figure)}{condition}"
         yield f"{title}: {self.method}; {self.n} runs, {self.failed} failed"
         columns: dict[str, list[str]] = {"parameter": list(self.names)}
         for index, estimates in (("first order", self.first), ("total", self.total)):

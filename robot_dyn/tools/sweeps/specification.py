@@ -29,7 +29,7 @@ from robot_dyn.tools.sweeps.sweep import Sweep
 FILE = "sweep.json"
 FORMAT = 6
 _MOST_BYTES = 2**26
-_NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
+_NONE = "start a sweep with robot-dyn sweep SCENE.toml … -o FOLDER"
 _PLACE = "scene"  # its path may differ
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn import RobotDynError, Setup, parameters
 from robot_dyn.foundations import Answer, Block, QueryError, SweepError, Table, Value, integer, shorten, shown, truth
 from robot_dyn.queries import joint_types_of, unit
-from robot_dyn.tools.sweeps.designs import Design, design, given
+from robot_dyn.tools.sweeps.designs import Design, design, from_table
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.figures import Figure, UserFigure, figure
 from robot_dyn.tools.sweeps.imported import by_name, imported, is_import_path, is_scene, source_of
@@ -103,7 +103,7 @@ class Sweep(Answer, Value):
         """The design, drawn once."""
         dimensions = len(self.dimensions)
         if self.drawn is not None and isinstance(self.design, str):
-            return given(self.drawn, self.runs, dimensions, self.design)
+            return from_table(self.drawn, self.runs, dimensions, self.design)
         return design(self.design, self.runs, dimensions, self.seed)
 
     @cached_property

@@ -21,18 +21,18 @@ _EXAMPLES = {
 }
 
 
-def called(what: str, text: object, functions: Mapping[str, Callable[..., Result]]) -> Result:
+def called(kind: str, text: object, functions: Mapping[str, Callable[..., Result]]) -> Result:
     """Call a function with the literal arguments of a text, and return its result.
 
     Args:
-        what: Kind of the text, "distribution", "figure" or "samples".
+        kind: Kind of the text, "distribution", "figure" or "samples".
         text: A call, or a name without arguments.
         functions: Functions by name.
 
     Raises:
         SweepError: If the text is not a call, its name is unknown, or the arguments are invalid.
     """
-    wrong = SweepError(f"{what}: {shorten(text)!r} is not a name with arguments, for example {_EXAMPLES[what]}")
+    wrong = SweepError(f"{kind}: {shorten(text)!r} is not a name with arguments, for example {_EXAMPLES[kind]}")
     if not isinstance(text, str) or len(text) > _MOST:
         raise wrong
     try:
@@ -44,11 +44,11 @@ def called(what: str, text: object, functions: Mapping[str, Callable[..., Result
         raise wrong from None
     if not isinstance(call.func, ast.Name):
         raise wrong
-    return call_of(what, call.func.id, functions, arguments, by_name)
+    return call_of(kind, call.func.id, functions, arguments, by_name)
 
 
 def call_of(
-    what: str,
+    kind: str,
     name: str,
     functions: Mapping[str, Callable[..., Result]],
     arguments: Sequence[object],
@@ -56,7 +56,7 @@ def call_of(
 ) -> Result:
     """Call a function by name; raise a SweepError if it is unknown or does not accept the arguments."""
     if name not in functions:
-        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; for example {_EXAMPLES[what]}")
+        raise SweepError(f"no {kind} {shorten(name)!r}; {nearest(name, functions)}; for example {_EXAMPLES[kind]}")
     function = functions[name]
     try:
         bound = signature(function).bind(*arguments, **by_name)

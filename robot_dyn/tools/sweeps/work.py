@@ -30,10 +30,10 @@ Look = Callable[[float], object]
 @final
 @dataclass(frozen=True)
 class OneByOne:
-    """Runs made one by one, not in lock step.
+    """Runs simulated one by one, not in lock step.
 
     Attributes:
-        runs: Their number.
+        runs: Number of these runs.
         runs_s: Time of these runs, in [s].
         all_s: Time of all runs, in [s].
     """
@@ -80,14 +80,14 @@ class Work:
 
     @property
     def part(self) -> int:
-        """Number of runs that are made together: a multiple of the tile size, limited by memory."""
+        """Number of runs that are simulated together: a multiple of the tile size, limited by memory."""
         n, samples = self.sweep.setup.plant.dynamics.n, samples_of_run(self.sweep.setup)
         numbers = sum({"energy": 2, "work": 8}.get(name, n) for name in self.record)
         return LANES * max(1, min(256, _PART_BYTES // (8 * LANES * samples * max(1, numbers))))
 
     def rows(self, start: int, stop: int) -> Rows:
         """Return the rows of runs start, …, stop − 1."""
-        return self.made(start, stop, None)[0]
+        return self.run_rows(start, stop, None)[0]
 
     def compared(self) -> Comparison:
         """Make some runs, drawn at random, uncut and with steps that end at thresholds, and compare their figures."""
@@ -99,7 +99,7 @@ class Work:
         figures = {name: uncut[name] for name in sweep.figures}
         return Comparison(len(runs), sweep.runs, others, tuple(differences(figures, cut, sweep.units)))
 
-    def made(
+    def run_rows(
         self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None
     ) -> tuple[Rows, dict[str, np.ndarray], OneByOne]:
         """Make runs.
@@ -123,7 +123,7 @@ class Work:
             ran = result.statistics
             alone += OneByOne(ran.one_by_one, ran.one_by_one_s, ran.wall_s)
             if selection is not None and t is not None:
-                selected = selection.of(runs, result.diverged)
+                selected = selection.selected(runs, result.diverged)
                 _check_times(result.t, t)
                 for name, x in samples.items():
                     x[runs[selected] - start, : len(result.t)] = getattr(result, name)[selected]
@@ -188,11 +188,11 @@ class Work:
         runs, at = Runs(result, places), at[places]
         for name, figure in self.sweep.figures.items():
             try:
-                rows[name][at] = figure.of(runs)
+                rows[name][at] = figure.values(runs)
             except Exception:  # in a user's function: find the runs for which it raises
                 for i, place in enumerate(at.tolist()):
                     try:
-                        rows[name][place] = figure.of(runs.only(i))[0]
+                        rows[name][place] = figure.values(runs.only(i))[0]
                     except Exception as error:
                         rows["outcome"][place] = rows["reason"][place] = RAISED
                         rows["why"][place] = f"figure {name}: {because(error)}"

@@ -16,7 +16,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.shapes.triangles import Mesh, welded
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 
-CELLS = 32  # of the longest side of a mesh
+CELLS = 32  # cells along the longest side of a mesh
 
 
 def coarse(mesh: Mesh) -> Mesh:

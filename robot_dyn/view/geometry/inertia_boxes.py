@@ -20,7 +20,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.shapes.triangles import Mesh
 from robot_dyn.view.geometry.shapes import box, ellipsoid
 
-_THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with
+_THIN = 1e-3  # fraction of the longest edge that replaces an edge of length 0
 _SMALL = 0.01  # [m], edge drawn for a mass in one point
 _POINT, _LARGEST = 1e-6, 1e6  # [m]: shorter edges belong to a point mass; the largest length of an edge
 
@@ -65,7 +65,7 @@ def _lengths(mass: float, inertia: ndarray, factor: float) -> tuple[ndarray, nda
     """Return √(factor (I_y + I_z − I_x) / m) along the principal axes, and these axes as the columns of a rotation."""
     moments, axes = np.linalg.eigh(inertia)
     axes = axes * np.sign(np.linalg.det(axes))
-    with np.errstate(over="ignore"):  # of a mass of 1e-320 kg
+    with np.errstate(over="ignore"):  # for a mass of 1e-320 kg
         squares = factor * (moments.sum() - 2 * moments) / mass
     lengths = np.clip(np.sqrt(np.maximum(squares, 0.0)), 0.0, _LARGEST)
     return np.maximum(lengths, _THIN * lengths.max() if lengths.max() > _POINT else _SMALL), axes

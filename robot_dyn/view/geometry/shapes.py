@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from robot_dyn.shapes.triangles import Mesh, welded
 
-_SEGMENTS = 48  # of a circle
+_SEGMENTS = 48  # segments of a circle
 
 
 def box(x: float, y: float, z: float) -> Mesh:
@@ -74,4 +74,4 @@ def sphere(radius: float) -> Mesh:
     return ellipsoid(radius, radius, radius)
 
 
-PRIMITIVES: dict[str, Callable[..., Mesh]] = {"box": box, "cylinder": cylinder, "sphere": sphere}  # of URDF
+PRIMITIVES: dict[str, Callable[..., Mesh]] = {"box": box, "cylinder": cylinder, "sphere": sphere}  # shapes in URDF

@@ -28,10 +28,10 @@ from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipso
 from robot_dyn.view.geometry.shapes import PRIMITIVES
 
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # without material; rviz uses red
-_STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of a replacement
+_STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # fractions of a replacement
 _INERTIA: Rgba = (0.2, 0.4, 1.0, 0.35)
 _DOUBTFUL: Rgba = (1.0, 0.15, 0.1, 0.5)
-_Y_UP_REMARKS = {  # of files that are read the other way than usual
+_Y_UP_REMARKS = {  # remarks on files with an unusual up axis
     meshes.COLLADA: "its Collada meshes with <up_axis> Y_UP are turned to z up, as in Gazebo: raw, as in rviz, they"
     " stand away from the masses of their links",
     meshes.GLTF: "its glTF meshes are not turned to z up: in glTF y is up, but turned they stand away from the masses"
@@ -48,7 +48,7 @@ class Piece:
     Attributes:
         link: Name of the link.
         pose: Placement in the link's frame, shape (4, 4), rotation and translation; scales are in the vertices.
-        mesh: Its triangles; pieces of the same file and scale share the object.
+        mesh: Triangles of the visual; pieces of the same file and scale share the object.
         rgba: Red, green, blue and opacity, 0 … 1; times the texture, a PNG, if there is one.
     """
 
@@ -87,7 +87,7 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
     Args:
         robot: The robot; its edits do not change its look.
         package_dirs: Searched first; then folders above the file, ROS_PACKAGE_PATH, the installed example-robot-data.
-        inertia: Whether its boxes of inertia are shown: a note then lists those that are not as described.
+        inertia: True if inertia boxes are shown; a note then lists the boxes that are not as described.
 
     Returns:
         Pieces and notes; a mesh that is missing or damaged is noted and replaced, not raised.
@@ -136,7 +136,7 @@ class _Artist:
         self.notes, self.remarks, self.elsewhere = list[str](), list[str](), list[str]()
         self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs), remarks=self.elsewhere)
         self._turned = frozenset({meshes.GLTF})  # formats whose files with y up are turned to z up
-        self._y_up: list[tuple[str, str, ndarray, Mesh]] = []  # of these files: format, link, pose and mesh
+        self._y_up: list[tuple[str, str, ndarray, Mesh]] = []  # format, link, pose and mesh of these files
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
         self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag](*lengths))
         self._texture = cache(lambda path: meshes.png(mesh_files.bounded(path)))
@@ -249,7 +249,7 @@ class _Artist:
             parts, complaints = self._read(self.file(address), scale, self._turned)
         except MeshError as error:
             raise MeshError(f"mesh {self.shown(address)}: {error}") from None
-        if element.get("materials") == "ignored":  # of MJCF, whose geoms state the colour
+        if element.get("materials") == "ignored":  # MJCF: geoms state the colour
             return tuple(replace(part, rgba=None, image=None) for part in parts)
         self.notes += [f"mesh {self.shown(address)}: {complaint}; drawn without it" for complaint in complaints]
         return parts

@@ -69,7 +69,7 @@ class Bridge:
     """Answers requests and passes drawings on, inside a running event loop.
 
     Attributes:
-        url: Where requests arrive.
+        url: Address at which requests arrive.
         scene: The drawn scene.
     """
 

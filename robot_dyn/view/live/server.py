@@ -123,7 +123,7 @@ class Server:
 
     async def _serve(self, page: str, commands: list[Command], listening: socket) -> None:
         self._loop, self._closed = asyncio.get_running_loop(), asyncio.Event()
-        self._loop.set_exception_handler(lambda *_: None)  # of sockets with a faulty other end
+        self._loop.set_exception_handler(lambda *_: None)  # ignore errors of the other end of a socket
         try:
             bridge = Bridge(commands, self.url)
             self.zmq_url = bridge.url

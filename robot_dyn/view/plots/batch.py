@@ -24,7 +24,7 @@ from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
-_MOST_LINES = 100  # of runs that diverged
+_MOST_LINES = 100  # drawn runs that diverged
 _CELL_MM = 42.0  # the least width of a cell
 
 
@@ -99,7 +99,10 @@ def tracking(view: BatchView) -> list[Panel]:
     """
     runs = view.runs
     if runs.setup is None or runs.q is None:
-        raise PlotError("tracking: the runs were read from a file, or have no positions")
+        raise PlotError(
+            "tracking: positions were not recorded, or the runs were read from a file; use the result of rd.rollouts,"
+            " with q recorded"
+        )
     found = tracking_of(runs.setup, runs.t, np.nan_to_num(runs.q))
     if found.tracking_error is None:
         raise PlotError("tracking: the runs followed no reference")
@@ -127,7 +130,7 @@ def histogram(view: BatchView) -> list[Panel]:
     name, values = _column(view.runs, "y", view.y, ("rms tracking error", "largest", "ended"))
     some = np.isfinite(values) & ~view.runs.diverged
     if not some.any():
-        raise PlotError(f"no run that did not diverge has a {name}")
+        raise PlotError(f"every run diverged or has no {name}")
     counts, edges = np.histogram(values[some], bins=min(30, max(5, int(np.sqrt(some.sum()) * 1.5))))
     bars = Bars(_title(view, some), name, "runs [1]", counts, edges, lost=int(view.runs.diverged.sum()))
     return [Panel(f"Histogram of {name}", ((bars,),), 47.0)]
@@ -142,7 +145,7 @@ def scatter(view: BatchView) -> list[Panel]:
     runs = view.runs
     varied = [name for name, x in runs.table().items() if name != "run" and _numeric(x) and np.ptp(x) > 0]
     if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.varied, "start "))]):
-        raise PlotError("scatter: no parameter and no start differs from run to run; name a column by x=")
+        raise PlotError("scatter: no parameter or initial state varies between the runs; name a column by x=")
     x, at = _column(runs, "x", view.x or varied[0], ())
     y, values = _column(runs, "y", view.y, ("rms tracking error", "largest", "ended"))
     held = ~runs.diverged

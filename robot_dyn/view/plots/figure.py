@@ -16,7 +16,7 @@ from robot_dyn.view.rests import Rest
 from robot_dyn.view.series import thinned
 
 _WILD = 1e3  # times its usual size: what grew beyond it while a run diverged needs a logarithm
-NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
+NEAR = 0.2  # fraction of its effort limit: a torque that stays below is drawn without it
 _MOST_MARKS = 200  # in a cell
 _LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
 _PIXELS = 1000  # across a cell
@@ -41,7 +41,7 @@ class Style:
     """Style of a figure.
 
     Attributes:
-        colours: Of paper, ink, grid and lines, as in `THEMES`.
+        colours: Colours of paper, ink, grid and lines, as in `THEMES`.
         heading, text, small: Sizes of headings, of titles, and of labels and numbers, in [pt].
         line: Width of a curve, in [pt].
         titled: True if the figure has a title.
@@ -70,10 +70,10 @@ class Curve:
     """y over x, both (m,).
 
     Attributes:
-        label: Its name in the legend; one that begins with _ has no entry there.
+        label: Name in the legend; a name that begins with _ has no entry.
         style: Numbers of its colour and its dashes.
-        dots: Whether its points are drawn, without a line.
-        is_scaled: Whether the axes have room for it.
+        dots: True to draw points without a line.
+        is_scaled: True if the axes are scaled to show it.
     """
 
     label: str
@@ -92,7 +92,7 @@ class Axes:
         title: Text above them.
         x, y: Names of the axes, with their units.
         note: Text after the title.
-        own_legend: Whether its curves are named under its title, because no other cell has the same.
+        own_legend: True if the curves are named under the title, because no other cell has the same curves.
     """
 
     title: str
@@ -113,9 +113,9 @@ class Cell(Axes):
 
     Attributes:
         curves: Curves; over time unless `x` names another quantity.
-        log: Whether y has a logarithmic scale.
+        log: True if y has a logarithmic scale.
         limit: Drawn at ±limit.
-        until: What lies after this time is veiled.
+        until: Time after which the cell is veiled.
         marks: Times of events, dotted.
         rests: Shaded, those at a stop in colour.
         bands: Label, lower and upper edge over the x of the first curve, and opacity.
@@ -134,7 +134,7 @@ class Cell(Axes):
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw the curves, limits and scales."""
         theme, colours = style.colours, style.colours["lines"]
-        log = self.log and any(np.any(curve.y > 0) for curve in self.curves)  # of zeros alone there is no logarithm
+        log = self.log and any(np.any(curve.y > 0) for curve in self.curves)  # zero has no logarithm
         for curve in self.curves:
             self._draw(curve, axes, style, log)
         first = self.curves[0].x
@@ -205,13 +205,13 @@ def scale(
     """Set bounds that show all finite values, and as many numbers as there is room for.
 
     Args:
-        axes: Of Matplotlib.
+        axes: Axes of Matplotlib.
         side: "x" or "y".
         z: Values.
         limit: Shown at ±limit too, unless the curve would be flat between such far lines.
-        diverged: Whether values may have grown without bound.
-        log: Whether the scale is logarithmic.
-        counts: Whether values that are whole numbers get numbers at whole places only.
+        diverged: True if values may have grown without bound.
+        log: True if the scale is logarithmic.
+        counts: True to label whole numbers only, if all values are whole numbers.
     """
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator, ScalarFormatter
 
@@ -227,7 +227,7 @@ def scale(
         )
         axis.set_major_locator(LogLocator())
     elif diverged and size.max() > _WILD * (usual := np.quantile(size, 0.25, method="lower")):
-        getattr(axes, f"set_{side}scale")("symlog", linthresh=usual)  # what led to the end is as legible as the end
+        getattr(axes, f"set_{side}scale")("symlog", linthresh=usual)  # small values before the end stay legible
         bounds = 2 * min(low, 0.0), 2 * max(high, 0.0)
         powers = 10.0 ** np.linspace(np.log10(usual), np.log10(size.max()), 4).round()[1:]
         axis.set_major_locator(FixedLocator([0.0, *powers, *-powers]))
@@ -266,7 +266,7 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     moved = np.zeros(len(y), dtype=bool)
     for z in (x, y):
         size = np.abs(z[np.isfinite(z) & (z != 0)])
-        if len(size):  # of a run that diverged, what came before is as large in the picture
+        if len(size):  # show the time before a divergence at its usual scale
             pixel = min(size.max(), _WILD * np.quantile(size, 0.25, method="lower")) / _PIXELS
             moved |= np.diff(np.round(z / pixel), prepend=np.nan) != 0
     moved[[0, -1]] = True

@@ -33,7 +33,7 @@ class View:
         joints: Columns of the joints shown.
         types: Type of each joint of the run; None where it is not known.
         efforts, speeds: Limits of u and v of each joint of the run, in SI units; inf for none.
-        width: Of the figure, in [mm].
+        width: Width of the figure, in [mm].
     """
 
     run: TrajectoryData
@@ -78,7 +78,7 @@ def overview(view: View) -> list[Panel]:
     panels = [Panel(heading, tuple(rows), 24.0, every=len(rows))]
     if run.tracking_error is not None and run.desired is None:
         panels += tracking(view)
-    lower = _ledger(view) if run.ledger.known else []
+    lower = _ledger(view) if run.ledger.is_recorded else []
     lower += [_growth(view, run.error)] if run.error is not None and len(run.error.t) > 1 else []
     lower = [replace(cell, y=cell.y[cell.y.index("[") :]) for cell in lower]  # titles name the quantity
     across = max(1, min(2, int(view.width / _WIDE_MM)))
@@ -113,7 +113,7 @@ def energy(view: View) -> list[Panel]:
         PlotError: If they were not recorded.
     """
     ledger = view.run.ledger
-    if not ledger.known:
+    if not ledger.is_recorded:
         raise PlotError("energy and work of the run were not recorded; add energy and work to record of rollouts")
     known = np.isfinite(ledger.residual).any() and np.isfinite(ledger.exchanged)
     part = f": the residual is {ledger.closure:.1e} of the exchanged energy" if known and ledger.exchanges else ""

@@ -115,12 +115,12 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
     return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.all()))
 
 
-def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
+def _names(option: str, value: Any, kind: str) -> tuple[str, ...]:
     """Return the names given as one name or several."""
-    if isinstance(given, str):
-        return (given,)
-    if (names := () if given is None else several(given)) is None:
-        raise QueryError(f"{option}: give names of {of}, got {text_of(given)}")
+    if isinstance(value, str):
+        return (value,)
+    if (names := () if value is None else several(value)) is None:
+        raise QueryError(f"{option}: give names of {kind}, got {text_of(value)}")
     return names
 
 

@@ -33,7 +33,7 @@ class Panel:
     """Rows of cells under a heading, and below them one legend of the curves that cells share.
 
     Attributes:
-        heading: What the cells show.
+        heading: Contents of the cells.
         rows: Cells from the left to the right.
         height: About how high a row is, with title and numbers, in [mm]; less where the page is full.
         every: Number of rows that share the numbers and the name of x, below the last of them.
@@ -45,7 +45,7 @@ class Panel:
     every: int = 1
 
     def tall(self, height: float) -> float:
-        """Return its approximate height, in [mm], with rows of a given height."""
+        """Return the approximate height of the sheet, in [mm], with rows of a given height."""
         return _HEADING + height * len(self.rows)
 
 

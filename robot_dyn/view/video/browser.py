@@ -25,8 +25,8 @@ _NAMES = (
     "google-chrome", "google-chrome-stable", "chromium", "chromium-browser", "chrome", "microsoft-edge",
     "microsoft-edge-stable",
 )  # fmt: skip
-_PROGRAMS = ("/Applications/Chromium.app/Contents/MacOS/Chromium",)  # of browsers without a channel, on macOS
-_CHANNELS = ("chrome", "msedge")  # of browsers that are not on the path
+_PROGRAMS = ("/Applications/Chromium.app/Contents/MacOS/Chromium",)  # browsers without a channel, on macOS
+_CHANNELS = ("chrome", "msedge")  # browsers that are not on the path
 # WebGL by the processor, so that pictures do not depend on a graphics card; no network.
 _FLAGS = [
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--host-resolver-rules=MAP * ~NOTFOUND",

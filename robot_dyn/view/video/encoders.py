@@ -63,4 +63,4 @@ def encode(pictures: Iterable[bytes], file: Path, size: tuple[int, int], fps: in
     finally:
         writer.close()
     if not file.is_file() or not file.stat().st_size:
-        raise VideoError("ffmpeg has written nothing; is the disk of the temporary files full?")
+        raise VideoError("ffmpeg wrote no output; check that the disk of the temporary folder is not full")

@@ -22,8 +22,8 @@ from robot_dyn.view.video.browser import frames, installed, playwright
 KINDS = FileKind("an MP4 video", ".mp4", b"\0\0\0"), FileKind("a GIF", ".gif", b"GIF8")
 _FPS, _MOST_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
 _MOST_FRAMES = 20_000
-_ROUNDING = 1e-9  # of a frame: T fps is a whole number up to this
-_MOST_PIXELS = 5 * 10**8  # of a GIF, whose frames are held in memory, with 4.5 bytes for each
+_ROUNDING = 1e-9  # fraction of a frame: T fps is a whole number up to this
+_MOST_PIXELS = 5 * 10**8  # pixels of a GIF; its frames take 4.5 bytes a pixel in memory
 _LEAST_SIZE, _MOST_SIZE = 160, 3840
 
 
@@ -86,16 +86,16 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 def _checked_times(duration_s: float, fps: int, kind: str, size: tuple[int, int]) -> np.ndarray:
     """Return the times of the frames; raise a VideoError if their number or size is not allowed."""
     if not duration_s > 0:
-        raise VideoError("the page has no run of a length above 0, so that nothing moves; .save(path) writes the page")
+        raise VideoError("no run on the page has a duration, so nothing moves; save the page with .save(path)")
     count = duration_s * fps
     if count > _MOST_FRAMES:
         raise VideoError(
-            f"{duration_s:g} s at {fps} frames a second are {count:.0f} frames, more than {_MOST_FRAMES}; take fewer a"
-            " second"
+            f"{duration_s:g} s at {fps} frames a second are {count:.0f} frames, more than {_MOST_FRAMES}; use a lower"
+            " frame rate"
         )
     if kind == ".gif" and count * size[0] * size[1] > _MOST_PIXELS:
         raise VideoError(
-            f"{count:.0f} frames of {size[0]} × {size[1]} pixels are too many for a .gif; take fewer a second, a"
+            f"{count:.0f} frames of {size[0]} × {size[1]} pixels are too many for a .gif; use a lower frame rate, a"
             " smaller size, or an .mp4"
         )
     return frame_times(duration_s, fps)

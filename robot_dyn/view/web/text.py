@@ -35,7 +35,7 @@ def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
     """Return the HTML text of a document: title, outcome, notes, duration, scene, plots; commands unless it is `live`.
 
     Args:
-        document: Of `document` or `still`.
+        document: Result of `document` or `still`.
         viewer: Name of a file with the text of `shared_viewer`, next to the page; if empty, the viewer is in the page.
     """
     web = Path(__file__).parent

@@ -39,7 +39,7 @@ def test_each_fault_is_named(name: str) -> None:
     assert (broken.kind, broken.where) in {(each.kind, each.where) for each in made.findings}
     blamed = {each.where for each in made.findings if each.severity is not Severity.NOTE}
     assert blamed <= {broken.where, "file"}
-    assert all(each.what and each.remedy for each in made.findings)
+    assert all(each.message and each.remedy for each in made.findings)
 
 
 @pytest.mark.parametrize("name", [name for name, each in BROKEN.items() if each.restored])
@@ -240,7 +240,7 @@ def test_the_line_and_the_text_of_a_finding_are_those_of_the_file_though_another
     text = BROKEN["kg mm²"].change(BROKEN["decimal comma"].change(BROKEN["crossed limits"].change(SOUND)))
     of_kind = {each.kind: each for each in checked(text.encode(), "rig.urdf").findings}
     assert of_kind["inertia_shape"].line == 1 + text[: text.index("<inertial", text.index('"upper"'))].count("\n")
-    assert 'lower limit "2.5" is above its upper limit "-2.5"' in of_kind["limits_crossed"].what
+    assert 'lower limit "2.5" is above its upper limit "-2.5"' in of_kind["limits_crossed"].message
 
 
 def test_what_is_left_is_what_a_check_of_the_repaired_file_finds() -> None:
@@ -380,7 +380,7 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
 def test_the_multiple_of_a_right_angle_that_is_meant_is_named(word: str, named: str) -> None:
     text = SOUND.replace('xyz="0.3 0 0" rpy="0 0 0.3"', f'xyz="0.3 0 0" rpy="0 {word} 0"')
     (finding,) = checked(text.encode(), "rig.urdf").findings
-    assert f'rpy "0 {word} 0" differs from {named} by' in finding.what
+    assert f'rpy "0 {word} 0" differs from {named} by' in finding.message
     assert finding.remedy == f"write {named} to 16 digits"
 
 
@@ -423,7 +423,7 @@ def test_masses_of_one_density_are_told(scatter: float, found: bool) -> None:
     kinds = {each.kind: each for each in checked(chain(masses, edges).encode(), "cubes.urdf").findings}
     assert ("density_uniform" in kinds) is found
     if found:
-        assert "5 of 5 links have a density of" in kinds["density_uniform"].what
+        assert "5 of 5 links have a density of" in kinds["density_uniform"].message
 
 
 def test_masses_of_equal_links_are_no_sign_of_one_material() -> None:
@@ -435,7 +435,7 @@ def test_masses_of_equal_links_are_no_sign_of_one_material() -> None:
 def test_an_arm_of_points_with_shapes_is_a_warning_and_a_single_one_is_a_note() -> None:
     masses, edges = [1.0, 1.5, 0.9], [0.1, 0.12, 0.09]
     points = [x for x in checked(chain(masses, edges, 0.0).encode(), "cubes.urdf").findings if x.kind == "inertia_zero"]
-    assert [x.severity for x in points] == [Severity.WARNING] * 3 and "all its moments are 0" in points[0].what
+    assert [x.severity for x in points] == [Severity.WARNING] * 3 and "all its moments are 0" in points[0].message
     (alone,) = [x for x in checked(chain([1.0], [0.1], 0.0).encode(), "cube.urdf").findings if x.kind == "inertia_zero"]
     assert alone.severity is Severity.NOTE
 
@@ -447,7 +447,7 @@ def test_meshes_of_another_computer_are_noted_with_the_path_or_the_folder_that_w
     file = tmp_path / "arm.urdf"
     file.write_text(SOUND.replace('<box size="0.05 0.07 0.12"/>', f'<mesh filename="{address}"/>'))
     (absent,) = [x for x in check_urdf(file).findings if x.kind.startswith("shape")]
-    assert (absent.kind, absent.where) == ("shape_missing", "link 'hand'") and address in absent.what
+    assert (absent.kind, absent.where) == ("shape_missing", "link 'hand'") and address in absent.message
     (tmp_path / "meshes").mkdir()
     stl(tmp_path / "meshes" / "hand.stl", 0.3)
     (near,) = [x for x in check_urdf(file).findings if x.kind.startswith("shape")]

@@ -58,6 +58,29 @@ def test_moments_of_a_body_within_its_own_shape_raise_no_alarm() -> None:
     assert alarms <= 0.01 * len(links)
 
 
+@pytest.mark.parametrize(
+    ("edges", "axes", "axis", "ratio"),
+    [
+        # Σ of a uniform box along an edge e is m e²/12, and the bound along another edge f is m f²/4: e²/(3 f²)
+        ((0.6, 0.1, 0.1), [1, 0, 2], 1, 12.0),
+        ((0.6, 0.1, 0.1), [2, 1, 0], 2, 12.0),
+        ((0.4, 0.3, 0.1), [2, 1, 0], 2, 16 / 3),
+        ((0.4, 0.3, 0.1), [0, 2, 1], 2, 3.0),
+        ((0.2, 0.5, 0.1), [0, 2, 1], 2, 25 / 3),
+    ],
+)
+def test_moments_exchanged_between_axes_exceed_the_bound_along_the_short_one(
+    edges: tuple[float, float, float], axes: list[int], axis: int, ratio: float
+) -> None:
+    squares = np.square(edges)
+    moments = np.diag((squares.sum() - squares) / 12)[axes][:, axes]
+    most = excess(2.0, 2.0 * moments, CORNERS * edges)
+    assert most.ratio == pytest.approx(ratio, rel=1e-12)
+    assert abs(most.n[axis]) == pytest.approx(1.0) and most.extent == pytest.approx(edges[axis] / 2)
+    assert most.needed == pytest.approx(most.extent * ratio**0.5)
+    assert np.trace(moments) / 2 <= (squares / 4).sum()  # the bound on ½ tr I finds none of them
+
+
 def exchanged(axes: list[int]):
     P = np.eye(3)[axes]
     return lambda link: replace(link, moments=P @ link.moments @ P.T)
@@ -123,3 +146,13 @@ def test_a_possible_body_is_left_alone() -> None:
     links = [body(rng) for _ in range(200)]
     assert max(excess(link.mass, link.moments, link.points).ratio for link in links) < SLACK
     assert all(link.plausible() for link in links)
+
+
+@pytest.mark.parametrize(("axes", "name"), [([1, 0, 2], "x and y"), ([2, 1, 0], "x and z"), ([1, 2, 0], "x and z")])
+def test_an_exchange_of_two_axes_is_named_before_an_order_with_the_same_numbers(axes: list[int], name: str) -> None:
+    """A bar along x: iyy = izz, so a cyclic order of the axes gives the numbers of an exchange."""
+    edges = np.array([0.6, 0.05, 0.05])
+    own = np.diag((edges @ edges - edges**2) / 12)
+    volume = float(edges.prod())
+    wrong = Body(2.0, 2.0 * own[axes][:, axes], CORNERS * edges, np.zeros(3), (volume, volume * own))
+    assert [repair.mistake for repair in repairs(wrong, texts(wrong), "2.0")] == [f"the axes {name} exchanged"]

@@ -52,6 +52,23 @@ def test_moments_that_no_link_of_this_length_has_are_reported(tmp_path: Path) ->
     assert kinds(arm(tmp_path, [right, LOWER, WRIST], [0.2, 0.36, 0.3])) == set()
 
 
+@pytest.mark.parametrize("radius", [0.2, 0.35, 0.37, 0.8, 2.0])
+def test_a_radius_of_gyration_beyond_the_next_joint_is_reported(tmp_path: Path, radius: float) -> None:
+    """½ tr I = m k² in a link whose next joint is 0.36 m away."""
+    moment = 2 / 3 * 4.0 * radius**2
+    path = arm(tmp_path, [link("upper", 4.0, "0 0 0.1", moment, moment, moment), LOWER, WRIST], [0.2, 0.36, 0.3])
+    assert (("inertia_wide", "link 'upper'") in kinds(path)) is (radius > 0.36)
+
+
+@pytest.mark.parametrize(("mass", "reported"), [(3.0, False), (3.14, False), (3.2, True), (0.3, True), (30.0, True)])
+def test_a_mass_more_than_5_percent_from_the_data_sheet_is_reported(
+    tmp_path: Path, mass: float, reported: bool
+) -> None:
+    path = arm(tmp_path, [LOWER, WRIST], [0.2, 0.36])
+    for options in ({"mass": {"lower": mass}}, {"total_mass": mass + 0.38}):
+        assert ("mass_sheet" in {kind for kind, _ in kinds(path, **options)}) is reported
+
+
 @pytest.mark.parametrize("tool", [[], [link("tool", 0.5, "0 0 0.03", 4e-4, 4e-4, 3e-4)]])
 def test_a_wrist_of_a_few_grams_is_reported(tmp_path: Path, tool: list[str]) -> None:
     """7 g after a link of 0.38 kg, at the end of the arm and before a tool; 0.07 kg is not."""
@@ -171,3 +188,13 @@ def test_a_dense_body_next_to_one_without_mass_is_judged_without_a_ratio(tmp_pat
     path = tmp_path / "r.urdf"
     path.write_text(f'{text}<mass value="50"/>{inertia}</inertial></link>{joints}</robot>', encoding="utf-8")
     assert "mass_neighbours" not in {finding.kind for finding in rd.tools.doctor.check_urdf(path).findings}
+
+
+def test_a_shape_that_covers_a_small_part_of_a_heavy_link_is_no_reason(tmp_path: Path) -> None:
+    """A foot of 0.6 kg with four balls as its contact: 3e5 kg/m³ in these, and an ankle of 0.07 kg before it."""
+    ball = '<collision><origin xyz="{} {} -0.03"/><geometry><sphere radius="0.005"/></geometry></collision>'
+    balls = "".join(ball.format(x, y) for x in (-0.05, 0.12) for y in (-0.03, 0.03))
+    box = '<visual><geometry><box size="0.2 0.08 0.06"/></geometry></visual>'
+    ankle = link("ankle", 0.07, "0 0 0.02", 4e-5, 4e-5, 3e-5)
+    foot = link("foot", 0.6, "0 0 0", 5e-4, 2e-3, 2e-3, box + balls)
+    assert "mass_neighbours" not in {kind for kind, _ in kinds(arm(tmp_path, [LOWER, ankle, foot], [0.2, 0.36, 0.05]))}

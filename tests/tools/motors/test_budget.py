@@ -171,7 +171,7 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
     assert "for gravity" in found.sentence
     assert any("the peak torque limit of shoulder_pan_joint" in each for each in found.findings)
     free = budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
-    assert free.fits and "no limit is known" in free.sentence
+    assert free.fits and "no limits are known" in free.sentence
     some = budget(PLAN, UR5)  # its file states no continuous torque
     assert "the motors suffice where limits are known; " in some.sentence
     every = budget(PLAN, UR5, continuous=100.0)
@@ -378,7 +378,7 @@ def test_the_least_pace_is_the_first_root_of_the_mean_square_though_neither_1_no
     pace = least_pace(SWING, plant, np.array([limit]))
     assert pace.fits and pace.factor == pytest.approx(1 / largest, rel=1e-6)  # O(h²) of the rule
     none = least_pace(SWING, plant, np.array([0.9 * np.sqrt(least)]))
-    assert not none.fits and none.share == pytest.approx(1 / 0.9, rel=1e-3)  # the best of 201 places of an octave
+    assert not none.fits and none.fraction == pytest.approx(1 / 0.9, rel=1e-3)  # the best of 201 places of an octave
 
 
 def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
@@ -444,7 +444,7 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
     heavy = ran("budget", "ur5", plan, "--payload", "wrist_3_link=5kg@0.12,0.03,0.05", "--limits", motors)
     assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
     assert refusal(["budget", "ur5"]).startswith("ur5: give a motion as well")
-    assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
+    assert "applies to a robot with a plan" in refusal(["budget", "s.toml", plan])
     assert "--fraction is for the fastest motion: add --fastest" in refusal(
         ["budget", "ur5", plan, "--fraction", "0.9"]
     )

@@ -42,13 +42,13 @@ def test_lines_without_text_are_skipped_whatever_their_commas(tmp_path: Path, bl
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("joint,peak\na,1\n", "unit of peak"),
+        ("joint,peak\na,1\n", "no valid unit"),
         ("joint,peek [N m]\na,1\n", "peek"),
         ("joint,peak [N m],gear_ratio\na,1,100\n", "'at'"),
         ("joint,peak [N m]\na,-1\n", "line 2: peak must be a positive number"),
         ("joint,peak [N m]\na,1,2\n", "3 entries for 2"),
         ("joint,peak [N m]\na,1\na,2\n", "twice"),
-        ("joint,peak [N m]\n", "names no motor"),
+        ("joint,peak [N m]\n", "contains no motors"),
         ("joint,peak [N m],rotor_inertia [kg m^2]\na,1,2\n", "needs a gear_ratio"),
     ],
 )

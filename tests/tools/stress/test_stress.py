@@ -87,7 +87,7 @@ def test_largest_payload_of_a_pole_is_that_of_statics() -> None:
     robot, rng = rd.Robot.from_text(text), np.random.default_rng(0)
     payload = limits.payload_limit(robot, random_states(robot, 300, rng), rng, (np.ones(1), np.ones(1)), Budget())
     assert payload.value == pytest.approx((30 / 9.80665 - 0.8) / 0.8, rel=1e-6)
-    assert payload.confirmed and payload.joint == "hinge" and payload.what.endswith("end")
+    assert payload.confirmed and payload.joint == "hinge" and payload.description.endswith("end")
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -96,8 +96,8 @@ def test_each_limit_is_confirmed_or_said(name: str) -> None:
     assert {each.kind for each in result.limits} == {"step", "gain", "speed", "payload"}
     assert result.failures == () and result.ok
     of_steps = [each for each in result.limits if each.kind == "step"]
-    assert {each.what for each in of_steps if each.confirmed} >= {"Euler", "Midpoint", "RK4", "DP8"}
-    assert all("iteration of its stages" in each.what for each in of_steps if not each.confirmed)
+    assert {each.description for each in of_steps if each.confirmed} >= {"Euler", "Midpoint", "RK4", "DP8"}
+    assert all("iteration of its stages" in each.description for each in of_steps if not each.confirmed)
 
 
 def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
@@ -110,7 +110,7 @@ def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
 
     monkeypatch.setattr(limits, "advice_about", wrong)
     result = rd.tools.stress.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
-    refuted = {each.what for each in result.limits if each.confirmed is False}
+    refuted = {each.description for each in result.limits if each.confirmed is False}
     assert {"Euler", "Midpoint", "RK4", "DP8"} <= refuted
     assert not result.ok and len(result.failures) == len(refuted) and "is refuted" in result.failures[0]
 
@@ -131,9 +131,9 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
         rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, method="Midpoint", step_s=2e-3,
         record_every_s=0.02,
     )  # fmt: skip
-    found = runs.judged(setup, "swing", Budget())
+    found = runs.compared_run(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
-    assert runs.judged(replace(setup, method="DP8"), "swing", Budget()).misleads is False  # rounding
+    assert runs.compared_run(replace(setup, method="DP8"), "swing", Budget()).misleads is False  # rounding
     small = runs.shrunk_run(found, "shrinking", Work())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
@@ -169,16 +169,16 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
             setup = rd.Setup(rd.Plant(robot, effects), state["q"], controller=held, duration_s=1e-4)
             assert abs(rd.advise(setup).fastest.eigenvalue) == pytest.approx(each.minimal, rel=0.06)
         elif each.note.startswith("Pinocchio"):
-            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).of(
+            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).digits_of(
                 each.quantity.split()[-1], "Pinocchio"
             )
             rough = 0.1 if "inverse" in each.quantity else 1e-9  # on the root mean square of 100 states
-            assert -np.log10(2.0**-53) - again.given == pytest.approx(each.minimal, rel=rough)
+            assert -np.log10(2.0**-53) - again.at_state == pytest.approx(each.minimal, rel=rough)
 
 
 def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
     """Gains of the PD by which steps are judged."""
-    law = next(each.setups[0].controller for each in result.limits if each.kind == "step" and each.what == "RK4")
+    law = next(each.setups[0].controller for each in result.limits if each.kind == "step" and each.description == "RK4")
     return law.kp, law.kd
 
 
@@ -254,7 +254,7 @@ def test_what_there_is_no_time_for_is_named_and_nothing_else_is_missing(looks: i
     if "random states" in late:
         assert result.out_of_time == ("random states", "all at these") and not result.worst
         return
-    found = {each.what.split(",")[0] for each in result.limits if each.kind == "step"}
+    found = {each.description.split(",")[0] for each in result.limits if each.kind == "step"}
     for name in FIXED_STEP:
         assert (name in found) != (f"step of {name}" in late or "steps" in result.out_of_time)
     for of in ("gain", "speed", "payload"):
@@ -304,7 +304,7 @@ def test_shrinking_that_has_no_time_keeps_the_smallest_failure_so_far(monkeypatc
         told.append(JudgedRun(what, 0.1, 1e-9, 1.0, 0.0, "", True, setup))
         return told[-1]
 
-    monkeypatch.setattr(runs, "judged", judged)
+    monkeypatch.setattr(runs, "compared_run", judged)
     work = Work(Budget(10, clock=ticking()))
     assert list(runs.judged_runs(robot, random_states(robot, 100, rng), 1, rng, work)) == told[-1:]
     assert work.out_of_time == ["shrinking of run 1"]
@@ -317,9 +317,9 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
     <joint name="hinge" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 1 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="5"/><dynamics damping="5"/></joint></robot>"""
     robot = rd.Robot.from_text(text)
-    setup = limits.held(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
+    setup = limits.holding_setup(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
     found = {
-        each.what: each for each in islice(filter(None, limits.step_limits(setup, 0, Work())), 4)
+        each.description: each for each in islice(filter(None, limits.step_limits(setup, 0, Work())), 4)
     }  # the explicit ones
     assert found["Euler"].value == pytest.approx(2 * robot.M(np.array([0.3]))[0, 0] / 5, rel=0.01)
     assert all(each.confirmed for each in found.values())

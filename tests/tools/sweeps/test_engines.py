@@ -86,7 +86,7 @@ def test_a_chunk_that_always_ends_its_worker_is_named(filled: Any, monkeypatch: 
     folder, _ = filled
     monkeypatch.setattr(chunks, "_ATTEMPTS", 4)
     client = Client(lambda chunk: chunk == 5)
-    with pytest.raises(SweepError, match="chunk 5 ended its worker 4 times"):
+    with pytest.raises(SweepError, match="chunk 5 crashed its worker 4 times"):
         fill(client, folder)
     assert folder.missing().tolist() == [5]
 

@@ -24,7 +24,7 @@ COLUMNS = {
 
 def truth(text: str) -> list[str]:
     """Of each run "yes", "no" or "?"."""
-    of = Expression(text).of(COLUMNS)
+    of = Expression(text).evaluate(COLUMNS)
     return ["yes" if a else "?" if b else "no" for a, b in zip(of.certain, of.possible, strict=True)]
 
 
@@ -59,7 +59,7 @@ def test_kleene_logic(text: str, expected: str) -> None:
 )  # fmt: skip
 def test_anything_else_is_refused(text: str) -> None:
     with pytest.raises(SweepError):
-        Expression(text).of(COLUMNS)
+        Expression(text).evaluate(COLUMNS)
 
 
 CALL, NUMBER = "functions are not supported", "compare the number"
@@ -83,13 +83,13 @@ def test_the_message_marks_the_place() -> None:
     with pytest.raises(SweepError, match="error > ⟨here⟩"):
         Expression("error > | diverged")
     with pytest.raises(SweepError, match="no column 'eror'; nearest: error"):
-        Expression("eror > 1").of(COLUMNS)
+        Expression("eror > 1").evaluate(COLUMNS)
 
 
 @given(st.text(max_size=40))
 def test_no_text_raises_anything_else(text: str) -> None:
     with suppress(SweepError):
-        Expression(text).of(COLUMNS)
+        Expression(text).evaluate(COLUMNS)
 
 
 @given(st.recursive(st.sampled_from(["a", "b"]), lambda t: st.one_of(
@@ -101,5 +101,5 @@ def test_logic_is_that_of_python(text: str) -> None:
     expected = [
         bool(eval(text.replace("!", "~"), {"a": np.bool_(x), "b": np.bool_(y)})) for x, y in zip(a, b, strict=True)
     ]
-    of = Expression(text).of({"a": a, "b": b})
+    of = Expression(text).evaluate({"a": a, "b": b})
     assert of.certain.tolist() == of.possible.tolist() == expected

@@ -58,7 +58,7 @@ def test_samples_whose_folder_cannot_be_made_are_refused_with_the_chunk(tmp_path
     folder.prepare()
     (folder.samples.path / "q" / "c").write_text("")
     with pytest.raises(SweepError, match=r"^chunk 1 \(runs 20 to 39\): "):
-        folder.write(1, *Work(sweep).made(20, 40, folder.samples.times()))
+        folder.write(1, *Work(sweep).run_rows(20, 40, folder.samples.times()))
     assert folder.missing().tolist() == [0, 1]
 
 
@@ -163,7 +163,7 @@ def test_another_scene_version_or_chunk_is_refused_by_name(begun_100: Path, file
 def test_a_folder_of_other_files_is_refused(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
-    with pytest.raises(SweepError, match=r"holds other files, such as thesis\.tex"):
+    with pytest.raises(SweepError, match=r"contains other files, such as thesis\.tex"):
         sw.run(swept(tmp_path, 50), tmp_path / "full")
 
 

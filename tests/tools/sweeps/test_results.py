@@ -84,15 +84,15 @@ def test_a_figure_that_finished_runs_have_not_is_no_failure(tmp_path: Path, monk
     some = np.isfinite(x)
     assert done.outcomes == {"finished": 200, "diverged": 0, "raised": 0} and 50 < some.sum() < 150
     for ask in (done.mean, done.sensitivity):
-        with pytest.raises(SweepError, match=rf"{(~some).sum()} runs that finished, .*given='known'"):
-            ask("late", given="finished")
-    assert done.mean("late", given="known").estimate == pytest.approx(x[some].mean(), rel=1e-12)
-    assert "mean of late given known" in str(done.mean("late", given="known"))
-    with pytest.raises(SweepError, match=r"some finished, but have no figure: pass given='known'"):
+        with pytest.raises(SweepError, match=rf"{(~some).sum()} runs that finished, .*condition='known'"):
+            ask("late", condition="finished")
+    assert done.mean("late", condition="known").estimate == pytest.approx(x[some].mean(), rel=1e-12)
+    assert "mean of late given known" in str(done.mean("late", condition="known"))
+    with pytest.raises(SweepError, match=r"some finished, but have no figure: pass condition='known'"):
         done.probability("failed | late > 0.45")
-    assert done.probability("late > 0.45", given="known").estimate == (x[some] > 0.45).mean()
-    assert set(done.worst("late", 200, given="known")) == set(np.flatnonzero(some))
-    assert "sensitivity of late given known" in str(done.sensitivity("late", given="known"))
+    assert done.probability("late > 0.45", condition="known").estimate == (x[some] > 0.45).mean()
+    assert set(done.worst("late", 200, condition="known")) == set(np.flatnonzero(some))
+    assert "sensitivity of late given known" in str(done.sensitivity("late", condition="known"))
 
 
 def test_quantiles_count_failures_as_infinite(done: sw.SweepResult) -> None:
@@ -124,22 +124,25 @@ def test_an_event_that_is_unknown_in_failed_runs_is_refused(done: sw.SweepResult
     assert done.probability("failed | error > 0.05").estimate == events.mean()
     with pytest.raises(SweepError, match=rf"unknown in {failed.sum()} runs, such as run 2: write 'failed \| error"):
         done.probability("error > 0.05")
-    given = done.probability("error > 0.05", given="finished")
+    given = done.probability("error > 0.05", condition="finished")
     assert given.n == 400 - failed.sum() and "given finished" in given.statistic
 
 
 def test_means_and_sensitivities_of_failed_runs_are_refused(done: sw.SweepResult) -> None:
     for question in (done.mean, done.sensitivity):
-        with pytest.raises(SweepError, match=r"given='finished'"):
+        with pytest.raises(SweepError, match=r"condition='finished'"):
             question("error")
     x = done.table("error")["error"]
-    assert done.mean("error", given="finished").estimate == pytest.approx(np.nanmean(x), rel=1e-12)
+    assert done.mean("error", condition="finished").estimate == pytest.approx(np.nanmean(x), rel=1e-12)
 
 
 def test_a_question_about_no_run_is_refused(tmp_path: Path) -> None:
     done = sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4e6])}), tmp_path / "out", chunk=20)
-    for ask in (lambda: done.quantiles("end", given="finished"), lambda: done.probability("kd > 1", given="finished")):
-        with pytest.raises(SweepError, match="no run is left with given='finished'"):
+    for ask in (
+        lambda: done.quantiles("end", condition="finished"),
+        lambda: done.probability("kd > 1", condition="finished"),
+    ):
+        with pytest.raises(SweepError, match="no run is left with condition='finished'"):
             ask()
 
 
@@ -148,7 +151,7 @@ def test_worst_runs_are_those_that_failed_then_the_largest(done: sw.SweepResult)
     failed = np.flatnonzero(np.isnan(x)).tolist()
     worst = done.worst("error", len(failed) + 2)
     assert list(worst[:-2]) == failed
-    assert worst[-2:] == done.worst("error", 2, given="finished")
+    assert worst[-2:] == done.worst("error", 2, condition="finished")
     assert x[list(worst[-2:])].tolist() == sorted(x[~np.isnan(x)])[::-1][:2]
 
 
@@ -224,7 +227,7 @@ def test_the_report_has_each_figure_and_the_lines_that_repeat_runs(done: sw.Swee
     assert "<script" not in text and "default-src 'none'" in text
     for name in done.sweep.figures:
         assert f"<h2>{name} [{done.units[name]}]</h2>" in text
-    assert f".run({done.worst('error', 1, given='finished')[0]})" in text
+    assert f".run({done.worst('error', 1, condition='finished')[0]})" in text
     assert text.count("<svg") == 1 + len(done.sweep.figures)
 
 

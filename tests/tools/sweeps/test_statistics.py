@@ -197,8 +197,8 @@ def test_the_label_of_a_statistic_names_the_runs_that_were_asked_about(tmp_path:
     """Finished runs without a figure did not fail."""
     done = of_figure(tmp_path, "partly", UNIT, design="random")
     assert done.outcomes == {"finished": 512, "diverged": 0, "raised": 0}
-    assert done.mean("f", given="known").failed == done.sensitivity("f", given="known").failed == 0
-    known = done.probability("f > 0.5", given="known")
+    assert done.mean("f", condition="known").failed == done.sensitivity("f", condition="known").failed == 0
+    known = done.probability("f > 0.5", condition="known")
     assert known.n == np.isfinite(done.table("f")["f"]).sum()
     assert "known" in known.statistic and "finished" not in known.statistic
-    assert "finished" in done.probability("kp > 0.5", given="finished").statistic
+    assert "finished" in done.probability("kp > 0.5", condition="finished").statistic

@@ -77,6 +77,9 @@ def test_no_cell_of_a_table_is_a_formula(done, tmp_path: Path) -> None:
     assert not any(cell.startswith(tuple("=+@\t\r\n")) for row in (heading, *rows) for cell in row)
     q = heading.index("q0[0] [rad]")
     np.testing.assert_array_equal([float(row[q]) for row in rows], done.table("q0[0]")["q0[0]"])
+    for frame in (done.to_pandas(), done.to_pandas("q0[0]")):
+        assert frame.index.name == "run"
+        np.testing.assert_array_equal(frame["q0[0]"], done.table("q0[0]")["q0[0]"])
     for text in ("=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "\n=1"):
         assert table_cell(text) == f"'{text}"
     for value in ("-1.5", "+2e3", "-inf", "a=b", "", -1.5, None, 3):

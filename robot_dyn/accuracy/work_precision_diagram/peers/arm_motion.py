@@ -25,7 +25,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.setup.setup import Setup
 
-_SAME = 1e-9  # of the largest entry of M, N and τ: two programs with the same arm agree to rounding
+_SAME = 1e-9  # fraction of the largest entry of M, N and τ: two programs with the same arm agree to rounding
 _STATES = 3  # number of states at which two programs are compared
 # Effects on single joints; their `torque` takes as long as code written by hand in NumPy.
 _JOINT_EFFECTS = ViscousFriction, RegularisedCoulombFriction, JointStopSpring, JointStopDamper

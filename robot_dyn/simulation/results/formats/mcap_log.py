@@ -102,7 +102,9 @@ def _states(run: TrajectoryData, stamps: Sequence[int], *values: np.ndarray) -> 
 
 def _of_numbers(columns: Sequence[Column]) -> Iterator[Topic]:
     """Yield a topic for each column."""
-    names = _names([f"/{_word(column.quantity)}" + f"/{_word(column.of)}" * bool(column.of) for column in columns])
+    names = _names(
+        [f"/{_word(column.quantity)}" + f"/{_word(column.component)}" * bool(column.component) for column in columns]
+    )
     for name, column in zip(names, columns, strict=True):
         yield name, _NUMBER, ({"data": x} for x in column.values.tolist())
 
@@ -119,4 +121,4 @@ def _names(names: Sequence[str]) -> list[str]:
 
 def _units(columns: Iterable[Column]) -> dict[str, str]:
     """Return the unit of each column, by quantity and name; q, v and u are position, velocity and effort."""
-    return {f"unit of {column.quantity} {column.of}".rstrip(): column.unit for column in columns if column.unit}
+    return {f"unit of {column.quantity} {column.component}".rstrip(): column.unit for column in columns if column.unit}

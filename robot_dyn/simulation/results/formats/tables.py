@@ -41,7 +41,9 @@ def write_parquet(run: RunData, columns: list[Column], stream: BinaryIO) -> None
     table = by_heading(columns)
     arrays = [arrow.array(values) for values in table.values()]
     fields = [
-        arrow.field(name, array.type, metadata={"quantity": column.quantity, "of": column.of, "unit": column.unit})
+        arrow.field(
+            name, array.type, metadata={"quantity": column.quantity, "of": column.component, "unit": column.unit}
+        )
         for name, array, column in zip(table, arrays, columns, strict=True)
     ]
     schema = arrow.schema(fields, metadata=attributes(run))

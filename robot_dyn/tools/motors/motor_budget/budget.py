@@ -82,7 +82,7 @@ def budget(
 def _sources(motors: Motors | None, given: Mapping[str, Any]) -> str:
     """Return the sources of the limits, in words."""
     stated = [
-        ("continuous torque", "continuous", motors and motors.continuous, "not known"),
+        ("continuous torque", "continuous", motors and motors.continuous, "unknown"),
         ("peak torque", "effort", motors, "the robot's file"),
         ("speed", "velocity", motors and motors.speed, "the robot's file"),
     ]

@@ -127,10 +127,10 @@ def _fits(motor_budget: MotorBudget, fraction: float) -> bool:
 def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
     """Return a message about the limit that is exceeded even at the best pace."""
     joint = motor_budget.joints[pace.joint]
-    limit = joint.continuous_limit
+    limit, unit = joint.continuous_limit, of_joint("N m", joint.type)
     return (
-        f"no pace fits: {joint.joint} needs {pace.share * limit:.4g} of {limit:.4g} {of_joint('N m', joint.type)} rms"
-        f" at the best pace, with {pace.factor:.4g} times the duration"
+        f"no pace fits: {joint.joint} needs {pace.fraction * limit:.4g} of {limit:.4g} {unit} rms at the best pace,"
+        f" with {pace.factor:.4g} times the duration"
     )
 
 

@@ -32,13 +32,13 @@ class Pace(NamedTuple):
     """A factor λ on the duration, the largest share rms/limit of a joint with it, and the index of the joint."""
 
     factor: float
-    share: float
+    fraction: float
     joint: int
 
     @property
     def fits(self) -> bool:
         """True if no limit is exceeded by more than the tolerance of budgets."""
-        return self.share <= 1 + TOLERANCE
+        return self.fraction <= 1 + TOLERANCE
 
 
 def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray) -> Pace:
@@ -49,7 +49,7 @@ def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray
         return Pace(float(factor), float(shares.max()), int(shares.argmax()))
 
     best = at(1.0)
-    if best.share <= 1:
+    if best.fraction <= 1:
         return best
     for octave in range(_OCTAVES):
         u = 2.0 ** -(octave + 1) * np.array([1.0, 2.0])
@@ -59,7 +59,7 @@ def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray
                 return pace
         x = np.linspace(-1, 1, _DENSE)
         least = x[chebyshev.chebval(x, table).max(axis=0).argmin()]
-        best = min(best, at(1 / _place(u, least)), key=lambda pace: pace.share)
+        best = min(best, at(1 / _place(u, least)), key=lambda pace: pace.fraction)
     return best
 
 

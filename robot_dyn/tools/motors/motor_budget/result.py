@@ -72,7 +72,7 @@ class MotorBudget(Result):
         used = [(share, joint, kind) for joint in self.joints for kind, share in joint.shares.items()]
         share, nearest, kind = max(used, key=lambda x: x[0])
         if not share:
-            return "no limit is known, so the motors cannot be judged"
+            return "no limits are known, so the motors cannot be checked"
         verdict = "the motors suffice" if not self._unknown else "the motors suffice where limits are known"
         return f"{verdict}; {nearest.joint} is nearest to its {KINDS[kind]}, {nearest.says(kind)} ({share:.0%})"
 
@@ -92,7 +92,7 @@ class MotorBudget(Result):
         speed = torque | {"unit": [of_joint("rad/s", x.type) for x in joints]}
         at_peak, starts = {"at t [s]": [x.peak_at_s for x in joints]}, [x.breakaway for x in joints]
         yield f"limits: {self.limits}"
-        yield f"{self.resolution}; integrals by two rules differ by a fraction of {self.error:.1g}"
+        yield f"{self.resolution}; two rules of integration agree to {self.error:.1g}, relative"
         yield ""
         needs = torque | {"peak": [x.peak for x in joints]} | at_peak
         needs |= {"break-away": map(_four_digits, starts)} if any(x > 0 for x in starts) else {}
@@ -101,7 +101,7 @@ class MotorBudget(Result):
             "headroom": [_percent(x.headroom["peak"], x.peak_limit) for x in joints],
             "rms": [x.rms for x in joints],
             "continuous": [_four_digits(x.continuous_limit) for x in joints],
-            "left of it": [_percent(x.headroom["continuous"], x.continuous_limit) for x in joints],
+            "rms headroom": [_percent(x.headroom["continuous"], x.continuous_limit) for x in joints],
         }
         yield _table(needs)
         yield ""

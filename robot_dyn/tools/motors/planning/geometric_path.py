@@ -40,8 +40,8 @@ def geometric_path(source: PiecewisePolynomial | JointValues, joint_names: tuple
     speed = np.linalg.norm(path.at(s)[1], axis=-1)
     if speed.min() <= _SLOWEST * speed.mean():
         raise PlanError(
-            f"the path stands still at {s[np.argmin(speed)]:.6g}, where its velocity is 0 and its direction undefined;"
-            " give points on it, such as path.at(times)[0]"
+            f"the velocity of the path is 0 at {s[np.argmin(speed)]:.6g}, so its direction is undefined;"
+            " give points on the path, such as path.at(times)[0]"
         )
     inner = source.breaks[1:-1]
     ends = polynomial(path.coefficients[:-1], np.diff(source.breaks)[:-1, None]), path.at(inner)

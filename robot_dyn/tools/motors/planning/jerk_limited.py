@@ -22,7 +22,7 @@ from robot_dyn.tools.motors.limits import outside_positions
 _SAME = 1e-12  # relative to the duration: breaks of two joints that differ by less are one
 
 
-_Segment = tuple[float, ...]  # of one joint: start time, position, velocity, acceleration, jerk
+_Segment = tuple[float, ...]  # a joint's start time, position, velocity, acceleration, jerk
 
 
 def point_to_point(
@@ -79,8 +79,8 @@ def point_to_point(
 
 def _of_joints(arm: Robot, name: str, values: Any, *, limit: bool = False) -> np.ndarray:
     """Return one number for all joints, or one for each, as (n,); limits are positive and may be infinite."""
-    above, elsewhere, shape = (0.0, inf, (arm.n,)) if limit else (None, 0.0, (arm.n,))
-    values = in_order(name, values, arm.joint_names, elsewhere=elsewhere, error=PlanError)
+    above, fill_value, shape = (0.0, inf, (arm.n,)) if limit else (None, 0.0, (arm.n,))
+    values = in_order(name, values, arm.joint_names, fill_value=fill_value, error=PlanError)
     return np.broadcast_to(numbers(name, values, (), shape, error=PlanError, above=above, infinite=limit), shape)
 
 

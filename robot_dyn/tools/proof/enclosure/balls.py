@@ -109,7 +109,7 @@ class Inverse:
     A: Matrix
 
     @classmethod
-    def of(cls, M: Sequence[Ball]) -> Inverse:
+    def from_matrix(cls, M: Sequence[Ball]) -> Inverse:
         """Return an approximate inverse of the midpoints of M, n² numbers row by row."""
         n = round(sqrt(len(M)))
         try:

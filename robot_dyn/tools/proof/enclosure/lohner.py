@@ -32,7 +32,7 @@ from robot_dyn.tools.proof.enclosure.polynomial import Polynomial, series
 from robot_dyn.tools.proof.enclosure.tube import Tube
 from robot_dyn.tools.proof.tape import Tape
 
-_ORDERS = 3, 6  # of Y: the second if the first has an error above _ENOUGH
+_ORDERS = 3, 6  # orders of Y: the second if the error of the first exceeds _ENOUGH
 _ENOUGH = 1e-3
 _DOUBT = 0.05  # largest δ
 

@@ -102,7 +102,7 @@ def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fr
     """
     time = exact(start.t)
     try:
-        inverse = Inverse.of(tape.mass(start.q))
+        inverse = Inverse.from_matrix(tape.mass(start.q))
         p = taylor(tape, time, start.q, start.v, inverse, how.order)
         longest = _longest(p, how, before)
         weights, growth, rate = _weights(tape, time, p, inverse, longest, start.error.bounds, how.tolerance)

@@ -19,7 +19,7 @@ from robot_dyn.tools.proof.enclosure.linearised import on_a_set
 from robot_dyn.tools.proof.enclosure.polynomial import Defect, Polynomial
 from robot_dyn.tools.proof.tape import Tape
 
-_PARTS = 4  # of a step
+_PARTS = 4  # number of parts of a step
 _WIDER = 3  # times the initial bound of e
 _GUESS = 8  # times the expected difference of accelerations
 _MOST = 0.7  # h L: above this, the fundamental matrix is poorly known

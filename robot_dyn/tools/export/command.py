@@ -1,0 +1,57 @@
+"""The `export-c` command: writes the equations of an arm as C."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import AS_STATED, Effects, Force, Json, RobotOptions, bar, command, show, to_stderr
+from robot_dyn.foundations import QueryError
+
+RobotOrScene = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT", help="A name of `robot-dyn list`, the path of a URDF or MJCF file, or a scene.toml."
+    ),
+]
+
+
+@command("Files")
+def export_c(
+    robot: RobotOrScene,
+    /,
+    output: str,
+    quantities: str | None = None,
+    dtype: str = "float64",
+    name: str | None = None,
+    effects: Effects = None,
+    force: Force = False,
+    options: RobotOptions = AS_STATED,
+    as_json: Json = False,
+) -> None:
+    """Write the equations of an arm, or of the plant of a scene, as C.
+
+    The folder then holds a header, a source file, CMakeLists.txt and a self-test for ctest.
+
+    Options:
+        output (FOLDER): Folder for the files.
+        quantities (M,C,N,…): Functions: M, C, N, inverse_dynamics, forward_dynamics; by default all of up to 8 joints.
+        dtype: float64 for double, float32 for float.
+        name: Prefix of the names in C.
+    """
+    if robot.endswith(".toml"):
+        if options.stated or effects:
+            raise QueryError(f"{robot}: a scene states its robot and effects; leave out the options of a robot")
+        plant = rd.read_scene(robot).plant
+    else:
+        arm = options.load(robot)
+        plant = rd.Plant(arm, effects) if effects else arm
+    names = None if quantities is None else [x.strip() for x in quantities.split(",")]
+    with bar(description="exporting"):
+        source = rd.tools.export.c_source(plant, names, dtype=dtype, name=name)
+    paths = source.write(output, force=force)
+    show(source, as_json=as_json)
+    for path in paths:
+        to_stderr(f"written: {path}")
