@@ -99,6 +99,7 @@ EXCEPTIONS = {
     ("sweeps", "robot_dyn.simulation.rollouts.lock_step"): "chunks are multiples of the runs of one lock step",
     ("sweeps", "robot_dyn.simulation.rollouts.overview"): "a row holds the remarks on its run",
     ("sweeps", "robot_dyn.simulation.rollouts.rollouts"): "a sweep runs batches from rows of its design",
+    ("symbols", "robot_dyn.codegen.trace.base_parameters"): "formulas in base parameters have the fewest terms",
 }
 MOST_EXCEPTIONS = 15
 MOST_INTERNAL = 250  # statements of tests; most are on machine code, which has no other way in
@@ -205,7 +206,7 @@ def test_tests_import_few_names_that_no_folder_lists() -> None:
     assert len(places) <= MOST_INTERNAL
 
 
-TOOL_NAMES = ("doctor", "export", "identify", "motors", "proof", "step", "stress", "sweeps")
+TOOL_NAMES = ("doctor", "export", "identify", "motors", "proof", "step", "stress", "sweeps", "symbols")
 ROOMS = ("effects", "control", "integrate", "accuracy", "tools", *(f"tools.{name}" for name in TOOL_NAMES))
 
 

@@ -38,9 +38,10 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 # Made by the library: their constructors take what it computed.
 RESULTS = {
     "Advice", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
-    "ExpectedPrecision", "HeldOut", "Identification", "InverseKinematics", "MotorBudget", "Motors", "Parameter",
-    "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "SampledModel", "Sensitivity",
-    "State", "StaticEstimate", "Stress", "SweepResult", "Trajectory", "Verdict", "WorkPrecision",
+    "ExpectedPrecision", "HeldOut", "Identification", "InverseKinematics", "Meaning", "MotorBudget", "Motors",
+    "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference",
+    "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations",
+    "Trajectory", "Verdict", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -86,6 +87,7 @@ TOOLS = (
     rd.tools.step,
     rd.tools.stress,
     rd.tools.sweeps,
+    rd.tools.symbols,
 )
 ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
@@ -294,6 +296,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.export.c_source(robot, ["N"]).write, folder=folder / "c", force=True),
         call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
         call(rd.tools.export.parameter_values, plant=plant),
+        call(rd.tools.symbols.symbols, arm=robot, letters="base"),
         call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
         call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
             tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),

@@ -10,6 +10,7 @@ from robot_dyn.foundations.arithmetic import Arithmetic as Arithmetic
 from robot_dyn.foundations.arithmetic import Array as Array
 from robot_dyn.foundations.arithmetic import Ball as Ball
 from robot_dyn.foundations.arithmetic import Float as Float
+from robot_dyn.foundations.arithmetic import Numeral as Numeral
 from robot_dyn.foundations.arithmetic import arithmetic_of as arithmetic_of
 from robot_dyn.foundations.arithmetic import midpoint as midpoint
 from robot_dyn.foundations.arithmetic import radius as radius
@@ -75,6 +76,7 @@ from robot_dyn.foundations.spatial import adjoint as adjoint
 from robot_dyn.foundations.spatial import adjoint_inverse as adjoint_inverse
 from robot_dyn.foundations.spatial import block_diagonal as block_diagonal
 from robot_dyn.foundations.spatial import bracket as bracket
+from robot_dyn.foundations.spatial import first_moment as first_moment
 from robot_dyn.foundations.spatial import hat as hat
 from robot_dyn.foundations.spatial import homogeneous as homogeneous
 from robot_dyn.foundations.spatial import rotation as rotation

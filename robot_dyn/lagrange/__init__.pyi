@@ -1,7 +1,9 @@
 # Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange as EulerLagrange
+from robot_dyn.lagrange.formulas import FORMULAS as FORMULAS
 from robot_dyn.lagrange.generalized_force import lagrangian_of_particles as lagrangian_of_particles
 from robot_dyn.lagrange.linkage import Linkage as Linkage
+from robot_dyn.lagrange.linkage import Pose as Pose
 from robot_dyn.lagrange.linkage import linkage_of as linkage_of
 from robot_dyn.lagrange.magnitude import magnitudes as magnitudes
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body as articulated_body
@@ -21,4 +23,7 @@ from robot_dyn.lagrange.scale import scaled as scaled
 from robot_dyn.lagrange.scale import solved_tolerance as solved_tolerance
 from robot_dyn.lagrange.scale import unit_diagonal_condition as unit_diagonal_condition
 from robot_dyn.lagrange.scale import unit_diagonal_conditions as unit_diagonal_conditions
+from robot_dyn.lagrange.tree import Inertial as Inertial
+from robot_dyn.lagrange.tree import Joint as Joint
+from robot_dyn.lagrange.tree import Tree as Tree
 from robot_dyn.lagrange.tree import tree_of as tree_of

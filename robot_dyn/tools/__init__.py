@@ -7,6 +7,7 @@
     proof    theorems about where an arm will be
     stress   what breaks first on an arm
     export   the equations in C and CasADi, and discrete models
+    symbols  the equations of an arm as formulas
     step     many arms that advance together, with an action for each
 
 A tool imports names that a folder of the core lists in its `__init__.pyi`, with the exceptions in

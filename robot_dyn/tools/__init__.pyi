@@ -7,5 +7,6 @@ from robot_dyn.tools import proof as proof
 from robot_dyn.tools import step as step
 from robot_dyn.tools import stress as stress
 from robot_dyn.tools import sweeps as sweeps
+from robot_dyn.tools import symbols as symbols
 
 __all__: list[str]

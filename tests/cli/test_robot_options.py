@@ -20,6 +20,7 @@ TAKING = {
     "robot_dyn.cli.commands.query": ("info", "query", "compare"), "robot_dyn.cli.commands.show": ("show_",),
     "robot_dyn.cli.commands.cost": ("work_precision", "certify"), "robot_dyn.tools.motors.command": ("budget",),
     "robot_dyn.tools.stress.command": ("stress",), "robot_dyn.tools.export.command": ("export_c",),
+    "robot_dyn.tools.symbols.command": ("derive",),
 }  # fmt: skip
 
 

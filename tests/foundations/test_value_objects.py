@@ -110,6 +110,8 @@ def values() -> dict[str, Any]:
         rd.tools.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
         rd.tools.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),
         (source := rd.tools.export.c_source(ARM, ["N"])), source.functions[0],
+        (formulas := rd.tools.symbols.symbols(ARM)), formulas.letters["m1"],
+        rd.tools.symbols.RoundedAngle("roll of joint 'a'", 1.5708, 6),
         rd.tools.export.discretise(np.eye(2), np.ones((2, 1)), 0.01, 0.02),
         rd.tools.step.Stepper(ARM, 3).reset(Q),
         rd.tools.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),

@@ -1,0 +1,322 @@
+"""Polynomials with rational coefficients in letters, sines and cosines, as numbers of the equations.
+
+    s² = 1 − c²,   √2² = 2,   √3² = 3
+
+Every product is reduced by these relations, so that equal functions have equal polynomials and zero has none. The
+relations are a Gröbner basis, because their leading terms are coprime. [Cox, Little, O'Shea, Ideals, Varieties, and
+Algorithms, 4th ed., 2015, ch. 2 §9]
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, SupportsFloat, final
+
+import numpy as np
+
+from robot_dyn.foundations import Arithmetic, Numeral, QueryError
+
+if TYPE_CHECKING:
+    from flint import fmpq, fmpq_mpoly
+
+MAX_TERMS = 20_000  # of one polynomial; a page has some 40, and products of larger ones take minutes
+ROOTS = {"sqrt2": 2, "sqrt3": 3}
+
+
+@final
+@dataclass(frozen=True)
+class Letter:
+    """A letter for one number, by its name, or the negative of that number."""
+
+    name: str
+    negative: bool = False
+
+
+@final
+@dataclass(frozen=True)
+class Angle:
+    """An angle: `twelfths` of π, or a letter if `name` is not empty."""
+
+    twelfths: int = 0
+    name: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Component:
+    """A component of the unit vector (cos β cos α, cos β sin α, sin β): k is 0, 1 or 2."""
+
+    azimuth: Angle
+    elevation: Angle
+    k: int
+
+
+@final
+class Polynomial:
+    """A polynomial of a `Polynomials`, with the operators of NumPy's object arrays."""
+
+    __slots__ = ("ring", "value")
+
+    def __init__(self, ring: Polynomials, value: fmpq_mpoly) -> None:
+        self.ring, self.value = ring, value
+
+    def _with(self, value: fmpq_mpoly) -> Polynomial:
+        return Polynomial(self.ring, value)
+
+    def _operand(self, other: object) -> Any:
+        if type(other) is Polynomial:
+            return other.value
+        if type(other) is int:
+            return other  # flint has operators of polynomials and integers
+        return self.ring.constant(other) if isinstance(other, int | float | Fraction | np.number) else None
+
+    def __add__(self, other: object) -> Polynomial:
+        y = self._operand(other)
+        return NotImplemented if y is None else self._with(self.value + y)
+
+    def __sub__(self, other: object) -> Polynomial:
+        y = self._operand(other)
+        return NotImplemented if y is None else self._with(self.value - y)
+
+    def __rsub__(self, other: object) -> Polynomial:
+        return -self + other
+
+    def __mul__(self, other: object) -> Polynomial:
+        if type(other) is Polynomial:
+            if not self.value or not other.value:
+                return self if not self.value else other
+            return self._with(self.ring.reduced(self.value * other.value))
+        y = self._operand(other)
+        return NotImplemented if y is None else self._with(self.value * y)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __truediv__(self, other: object) -> Polynomial:
+        y = self._operand(other)
+        return NotImplemented if y is None else self._with(self.value / y)
+
+    def __neg__(self) -> Polynomial:
+        return self._with(-self.value)
+
+    def __abs__(self) -> Polynomial:
+        if not self.value.is_constant():
+            raise ValueError("the absolute value of a polynomial")
+        return -self if any(x < 0 for x in self.value.coeffs()) else self
+
+    def __bool__(self) -> bool:
+        return bool(self.value)
+
+    def __eq__(self, other: object) -> bool:
+        y = self._operand(other)
+        return NotImplemented if y is None else bool(self.value == y)
+
+    __hash__ = None  # pyright: ignore[reportAssignmentType]
+
+    def sqrt(self) -> Polynomial:
+        """Return the root of 1; axes are built as unit vectors, so that no other root is taken."""
+        if self != 1:
+            raise ValueError("a root of a polynomial")
+        return self
+
+    def terms(self) -> dict[tuple[int, ...], Fraction]:
+        """Return the coefficient of each monomial, by the exponents of the ring's generators."""
+        return {key: Fraction(int(x.p), int(x.q)) for key, x in self.value.to_dict().items()}
+
+    def derivative(self, name: str) -> Polynomial:
+        """Return the partial derivative by a generator."""
+        return self._with(self.value.derivative(self.ring.names.index(name)))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """An angle by its sine and cosine, which NumPy's `sin` and `cos` return.
+
+    Attributes:
+        s: Sine.
+        c: Cosine.
+    """
+
+    s: Polynomial
+    c: Polynomial
+
+    def sin(self) -> Polynomial:
+        """Return the sine."""
+        return self.s
+
+    def cos(self) -> Polynomial:
+        """Return the cosine."""
+        return self.c
+
+    # A locked joint is at ratio · value + offset, with ratio 1 and offset 0 where it follows no other.
+    def __rmul__(self, ratio: Polynomial) -> Turn:
+        if ratio != 1:
+            raise QueryError("a locked joint follows another with a multiplier: remove its <mimic>")
+        return self
+
+    def __add__(self, offset: Polynomial) -> Turn:
+        if offset != 0:
+            raise QueryError("a locked joint follows another with an offset: remove its <mimic>")
+        return self
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Polynomials(Arithmetic):
+    """The ring ℚ[letters, c, s, √2, √3] modulo the relations of this module.
+
+    Attributes:
+        letters: Names of letters, rates and sliding coordinates.
+        angles: Names of angles; generators are the sine "s_name" and the cosine "c_name" of each.
+    """
+
+    letters: tuple[str, ...]
+    angles: tuple[str, ...]
+
+    @property
+    def dtype(self) -> np.dtype:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Type of entries: Python objects."""
+        return np.dtype(object)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the generators. A sine precedes its cosine: s² is then the leading term of s² + c² − 1."""
+        trigonometric = (f"{function}_{name}" for name in self.angles for function in "sc")
+        return (*trigonometric, *ROOTS, *self.letters)
+
+    @cached_property
+    def _context(self) -> Any:
+        from flint import fmpq_mpoly_ctx
+
+        return fmpq_mpoly_ctx.get(self.names, "degrevlex")
+
+    @cached_property
+    def _generators(self) -> dict[str, Any]:
+        return dict(zip(self.names, self._context.gens(), strict=True))
+
+    @cached_property
+    def _relations(self) -> list[tuple[int, Any]]:
+        x, at = self._generators, self.names.index
+        circles = [(at(f"s_{name}"), x[f"s_{name}"] ** 2 + x[f"c_{name}"] ** 2 - 1) for name in self.angles]
+        return circles + [(at(name), x[name] ** 2 - square) for name, square in ROOTS.items()]
+
+    def reduced(self, value: fmpq_mpoly) -> fmpq_mpoly:
+        """Return the remainder by the relations; raise QueryError for a polynomial that is too long to read."""
+        if len(value) > MAX_TERMS:
+            raise QueryError(
+                f"the equations have more than {MAX_TERMS} terms, which nobody reads: lock joints by"
+                " arm.with_(lock={...}), pass letters='base', or write C code by rd.tools.export.c_source(arm)"
+            )
+        if value:
+            degrees = value.degrees()
+            for index, relation in self._relations:
+                if degrees[index] > 1:
+                    value = value % relation
+        return value
+
+    def constant(self, x: str | SupportsFloat) -> fmpq:
+        """Return a number as a rational of flint."""
+        from flint import fmpq
+
+        exact = Fraction(x) if isinstance(x, str | int | Fraction) else Fraction(float(x))
+        return fmpq(exact.numerator, exact.denominator)
+
+    def generator(self, name: str) -> Polynomial:
+        """Return a generator by its name."""
+        return Polynomial(self, self._generators[name])
+
+    def number(self, literal: Numeral | Letter | Angle | Component | Polynomial | Turn) -> Polynomial | Turn:  # pyright: ignore[reportIncompatibleMethodOverride]
+        if isinstance(literal, Letter):
+            letter = self.generator(literal.name)
+            return -letter if literal.negative else letter
+        if isinstance(literal, Angle):
+            return self._turn(literal)
+        if isinstance(literal, Component):
+            azimuth, elevation = self._turn(literal.azimuth), self._turn(literal.elevation)
+            return (elevation.c * azimuth.c, elevation.c * azimuth.s, elevation.s)[literal.k]
+        if isinstance(literal, Polynomial | Turn):
+            return literal
+        return self._constant(literal)
+
+    def of(self, x: Polynomial | int) -> Polynomial:
+        """Return a polynomial of a ring with as many generators, whose letters have other names; or a number."""
+        return (
+            Polynomial(self, self._context.from_dict(x.value.to_dict()))
+            if isinstance(x, Polynomial)
+            else self._constant(x)
+        )
+
+    def _constant(self, x: Numeral) -> Polynomial:
+        return Polynomial(self, self._context.constant(self.constant(x)))
+
+    def _turn(self, angle: Angle) -> Turn:
+        if angle.name:
+            return Turn(self.generator(f"s_{angle.name}"), self.generator(f"c_{angle.name}"))
+        return Turn(self._sine(angle.twelfths), self._sine(angle.twelfths + 6))
+
+    def _sine(self, twelfths: int) -> Polynomial:
+        """Return sin(k π/12) in √2 and √3."""
+        k = twelfths % 24
+        if k > 12:
+            return -self._sine(k - 12)
+        k = min(k, 12 - k)
+        if k in (0, 6):
+            return self._constant(k // 6)
+        one, two, three = self._constant(1), self.generator("sqrt2"), self.generator("sqrt3")
+        return (two * (three - 1) / 4, one / 2, two / 2, three / 2, two * (three + 1) / 4)[k - 1]
+
+    def scope(self) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def asarray(self, values: object) -> np.ndarray:
+        return self.array(values)
+
+    def finite(self, x: np.ndarray) -> np.ndarray:
+        return np.ones(x.shape, dtype=bool)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Numbers(Arithmetic):
+    """Floats, with angles at their multiple of π/12 or at the value of their letter.
+
+    Attributes:
+        values: Values of the letters.
+    """
+
+    values: dict[str, float]
+
+    @property
+    def dtype(self) -> np.dtype:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Type of entries: float64."""
+        return np.dtype(np.float64)
+
+    def number(self, literal: Numeral | Letter | Angle | Component) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
+        if isinstance(literal, Letter):
+            return self.values[literal.name] * (-1 if literal.negative else 1)
+        if isinstance(literal, Angle):
+            return self.values[literal.name] if literal.name else literal.twelfths * math.pi / 12
+        if isinstance(literal, Component):
+            azimuth, elevation = self.number(literal.azimuth), self.number(literal.elevation)
+            across = math.cos(elevation)
+            return (across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation))[literal.k]
+        return float(literal)
+
+    def scope(self) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def asarray(self, values: object) -> np.ndarray:
+        return self.array(values)
+
+    def finite(self, x: np.ndarray) -> np.ndarray:
+        return np.isfinite(x)
+
+
+def twelfths_of(angle: float, tolerance: float) -> int | None:
+    """Return k if an angle is within a tolerance of k π/12, or None."""
+    k = round(angle * 12 / math.pi)
+    return k if abs(angle - k * math.pi / 12) <= tolerance else None
