@@ -9,9 +9,7 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.foundations import rotation
-from robot_dyn.tools.identify.fourier_series import FourierSeries
-from robot_dyn.tools.identify.physical import links_of
-from robot_dyn.tools.identify.verdict import Verdict
+from robot_dyn.tools.identify import FourierSeries, Verdict, links_of
 
 ARMS = {"ur5": None, "panda": "panda_finger_joint1", "ur10": None, "xarm7": None, "ur3": None}
 FAULTS = (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.tools.identify.fourier_series import FourierSeries
+from robot_dyn.tools.identify import FourierSeries
 
 
 @dataclass(frozen=True)
