@@ -151,6 +151,7 @@ EXTRAS = {
     "data_for_other_tools.md": ("pandas", "xarray", "pyarrow", "mcap_ros2"),
     "follow_a_recorded_motion.md": ("mcap_ros2",),
     "how_fast_can_it_go.md": ("ruckig", "toppra"),
+    "identify_an_arm.md": ("cvxpy", "clarabel"),
     "sweep.md": ("pyarrow",),
 }
 

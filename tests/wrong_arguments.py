@@ -297,6 +297,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
         call(rd.tools.export.parameter_values, plant=plant),
         call(rd.tools.symbols.symbols, arm=robot, letters="base"),
+        call(rd.tools.symbols.symbols(robot).latex),
         call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
         call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
             tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),

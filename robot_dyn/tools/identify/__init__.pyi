@@ -27,6 +27,7 @@ from robot_dyn.tools.identify.information import gram as gram
 from robot_dyn.tools.identify.log import Log as Log
 from robot_dyn.tools.identify.log import read_log as read_log
 from robot_dyn.tools.identify.physical import links_of as links_of
+from robot_dyn.tools.identify.physical import nearest_possible as nearest_possible
 from robot_dyn.tools.identify.physical import pseudo_inertia as pseudo_inertia
 from robot_dyn.tools.identify.regression import Fit as Fit
 from robot_dyn.tools.identify.signals import Signals as Signals

@@ -16,7 +16,7 @@ from robot_dyn.report import processor_and_versions
 from robot_dyn.tools.identify.corrected import corrected
 from robot_dyn.tools.identify.estimation import COULOMB, VISCOUS, Estimate, Model, estimate, model_of
 from robot_dyn.tools.identify.log import Log, LogError, read_log, swapped
-from robot_dyn.tools.identify.physical import Links, links_of, physical
+from robot_dyn.tools.identify.physical import Links, links_of, nearest_possible
 from robot_dyn.tools.identify.regression import Rows, fit, rms
 from robot_dyn.tools.identify.result import HeldOut, Identification, Parameter
 from robot_dyn.tools.identify.signals import Signals
@@ -78,7 +78,7 @@ def identify(
     held_out = _held_out(model, result)
     _refuse_foreign(arm, result, held_out)
     r = len(model.base.columns)
-    theta = physical(links, model.base.R, result.fit.values[:r], result.fit.covariance[:r, :r])
+    theta = nearest_possible(links, model.base.R, result.fit.values[:r], result.fit.covariance[:r, :r])
     parameters = tuple(_parameters(model, result))
     friction = _identified_friction(model, result)
     robot, text = _corrected(arm, links, theta, friction, parameters, model, result)

@@ -105,7 +105,7 @@ def _entries(theta: Any) -> list[list[Any]]:
     return [[half - Ixx, -Ixy, -Ixz, x], [-Ixy, half - Iyy, -Iyz, y], [-Ixz, -Iyz, half - Izz, z], [x, y, z, m]]
 
 
-def physical(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def nearest_possible(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Return possible parameters of the links, (N, 10), that fit base parameters π, (r,), with their covariance.
 
     Raises:

@@ -33,6 +33,7 @@ class SymbolicEquations:
 
     Attributes:
         arm: The arm.
+        lettered: Which numbers are letters: "file", "base" or None.
         letters: Value of each letter and its place in the file, by name.
         rounded: Angles of the file that are read as multiples of π/12.
         polynomials: M (n, n), C (n, n) and N (n,) as reduced polynomials, by name.
@@ -40,10 +41,14 @@ class SymbolicEquations:
     """
 
     arm: Robot
+    lettered: Literal["file", "base"] | None
     letters: Mapping[str, Meaning]
     rounded: tuple[RoundedAngle, ...]
     polynomials: Mapping[str, np.ndarray]
     groups: tuple[tuple[str, ...], ...]
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return symbols, (self.arm, self.lettered)  # polynomials of flint cannot be pickled
 
     @property
     def n(self) -> int:
@@ -162,7 +167,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     needs("sympy", extra="symbols")
     if not isinstance(arm, Robot):
         raise QueryError(f"arm must be a Robot, for example rd.load('ur5'), got {shown(arm)}")
-    if letters not in ("file", "base", None):
+    if letters is not None and not (isinstance(letters, str) and letters in ("file", "base")):
         raise QueryError(f"letters must be 'file', 'base' or None, got {shown(letters)}")
     tree = tree_of(arm.description, arm.edits)
     locked = {joint.name for joint in tree.joints if joint.kind == "fixed" or joint.locked is not None}
@@ -202,7 +207,9 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     at = linkage.at(q)
     results: dict[str, Any] = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
     return _named(
-        SymbolicEquations(arm, meanings, tuple(lettering.rounded), results, _parallel(linkage, arm.joint_names))
+        SymbolicEquations(
+            arm, letters, meanings, tuple(lettering.rounded), results, _parallel(linkage, arm.joint_names)
+        )
     )
 
 
@@ -221,6 +228,8 @@ def _named(equations: SymbolicEquations) -> SymbolicEquations:
     converted = {
         key: np.vectorize(renamed.of, otypes=[object])(entries) for key, entries in equations.polynomials.items()
     }
+    for entries in converted.values():
+        entries.setflags(write=False)
     letters = {names.get(name, name): meaning for name, meaning in letters.items()}
     return replace(equations, letters=letters, polynomials=converted)
 

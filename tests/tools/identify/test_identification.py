@@ -22,10 +22,10 @@ from robot_dyn.tools.identify import (
     links_of,
     low_pass,
     model_of,
+    nearest_possible,
     pseudo_inertia,
     read_log,
 )  # fmt: skip
-from robot_dyn.tools.identify.physical import physical
 from tests.command import spawn
 from tests.tools.identify import logs
 
@@ -92,10 +92,10 @@ def test_bodies_are_possible_and_equal_the_file_where_the_log_is_blind() -> None
     for name in ("planar_2r", "ur5"):
         arm = rd.load(name)
         base, links = model_of(arm).base, links_of(arm)
-        theta = physical(links, base.R, base.R @ arm.inertial_parameters, np.eye(len(base.R)) * 1e-4)
+        theta = nearest_possible(links, base.R, base.R @ arm.inertial_parameters, np.eye(len(base.R)) * 1e-4)
         assert np.allclose(theta / links.sizes, links.theta / links.sizes, atol=1e-3)
         noisy = base.R @ arm.inertial_parameters + np.random.default_rng(0).normal(size=len(base.R)) * 0.3
-        for body in physical(links, base.R, noisy, np.eye(len(base.R)) * 1e-4):
+        for body in nearest_possible(links, base.R, noisy, np.eye(len(base.R)) * 1e-4):
             assert np.linalg.eigvalsh(pseudo_inertia(body)).min() > 0
 
 
