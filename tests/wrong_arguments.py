@@ -37,12 +37,12 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "CFunction", "CSource", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
-    "ExpectedPrecision", "InverseKinematics", "Meaning", "MotorBudget", "Motors", "PathPlan", "Plan", "Proof",
-    "Rollouts", "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State", "StaticEstimate",
-    "Stress", "SweepResult", "SymbolicEquations", "Trajectory", "WorkPrecision",
+    "Advice", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
+    "ExpectedPrecision", "HeldOut", "Identification", "InverseKinematics", "Meaning", "MotorBudget", "Motors",
+    "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference",
+    "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations",
+    "Trajectory", "Verdict", "WorkPrecision",
 }  # fmt: skip
-RESULTS |= {"Cause", "HeldOut", "Identification", "Parameter", "Verdict"}
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
     "Dynamics", "Effect", "EquationOfMotion", "HeldJoint", "Interval", "Mode", "CartesianReference", "ControlLaw",
@@ -297,6 +297,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
         call(rd.tools.export.parameter_values, plant=plant),
         call(rd.tools.symbols.symbols, arm=robot, letters="base"),
+        call(rd.tools.symbols.symbols(robot).latex),
         call(rd.tools.export.discretise, A=eye, B=np.ones((3, 1)), period_s=0.01, delay_s=0.004),
         call(rd.tools.identify.excite, arm=robot, duration_s=5.0, limits={"velocity": 2.0, "torque": 90.0}, box=None,
             tool=None, fraction=0.9, harmonics=5, noise=0.5, rate_hz=50.0, starts=1, seed=0, compare_longer=False),
@@ -306,6 +307,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(excited.save, path=folder / "excitation.csv"),
         call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, gains=1.0,
             effects=[rd.effects.ViscousFriction(0.1)], cutoff_hz=6.0, slow=0.05),
+        call(rd.tools.identify.payload, arm=robot, log=log, empty=log, link="pole", reference=excited.reference,
+            gains=1.0, cutoff_hz=6.0, slow=0.05),
         call(rd.tools.identify.identify(robot, log, gains=1.0).save, path=folder / "arm.urdf"),
         call(rd.tools.motors.path, plant=robot, points=[q, v], fraction=0.9, effort=50.0, velocity=4.0,
             acceleration=30.0, motors=None),

@@ -23,7 +23,7 @@ SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n[start]\nq = [0.4, 0.9]\n[[effec
 FILES = {
     "scene.toml": SCENE, "mistake.toml": SCENE.replace("duration_s", "duration"),
     "rig.urdf": URDF, "rig.xml": MJCF, "old.csv": "quantity,implementation", "other.csv": "x,y",
-    "accuracy.csv": "method,engine", "cost.csv": "group,what", "table.csv": "t [s],q\n",
+    "accuracy.csv": "method,engine", "cost.csv": "group,name", "table.csv": "t [s],q\n",
     "old.npz": "", "old.npz.csv": "", "old.json": '{\n "robot": "pendulum"\n}',
 }  # fmt: skip
 LINKS = {"link.npz": "scene.toml", "to_new.csv": "new.npz", "link.csv": "run.npz"}

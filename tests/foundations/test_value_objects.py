@@ -105,6 +105,7 @@ def values() -> dict[str, Any]:
         planned.expected, (poses := rd.tools.identify.Poses(np.eye(2), ARM.N(np.eye(2)))),
         rd.tools.identify.static(ARM, poses, friction=1.0),
         (identified := rd.tools.identify.identify(logs.FILE, logs.log(), reference=logs.reference())),
+        rd.tools.identify.payload(logs.FILE, logs.log(), reference=logs.reference(), link="tip"),
         identified.parameters[0], identified.held_out, identified.verdict, identified.verdict.causes[0],
         rd.tools.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
         rd.tools.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),

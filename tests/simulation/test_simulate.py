@@ -155,6 +155,17 @@ def test_samples_lie_at_multiples_of_the_record_period_whatever_the_step() -> No
     np.testing.assert_allclose(uneven.t, np.arange(11) * 0.01, atol=1e-12)
 
 
+@pytest.mark.parametrize(("step_s", "period_s"), [(0.01, 0.003), (0.01, 7e-4), (1e-3, 7e-4)])
+def test_no_step_is_longer_than_the_record_period(step_s: float, period_s: float) -> None:
+    """Also where the period does not divide the run; a sample is at most a step late."""
+    setup = rd.Setup(SMOOTH, **START, duration_s=0.1, method="RK4", step_s=step_s, record_every_s=period_s)
+    assert setup.taken_step_s <= period_s
+    run = rd.simulate(setup)
+    due = np.append(np.arange(0.0, 0.1, period_s), 0.1)
+    assert max(np.abs(run.t - t).min() for t in due) <= setup.taken_step_s
+    assert np.diff(run.t).max() < 2.0 * period_s
+
+
 def test_progress_is_told_at_each_step_and_in_the_companion_runs() -> None:
     times: list[float] = []
     options = {"method": "RK4", "step_s": 2e-3, "engine": "interpreted", "on_progress": times.append}

@@ -1,4 +1,6 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
+from robot_dyn.tools.identify.carried import PayloadEstimate as PayloadEstimate
+from robot_dyn.tools.identify.carried import payload as payload
 from robot_dyn.tools.identify.excitation import Excitation as Excitation
 from robot_dyn.tools.identify.excitation import excite as excite
 from robot_dyn.tools.identify.identification import identify as identify
@@ -19,6 +21,9 @@ __all__: list[str]
 from robot_dyn.tools.identify.estimation import Model as Model
 from robot_dyn.tools.identify.estimation import estimate as estimate
 from robot_dyn.tools.identify.estimation import model_of as model_of
+from robot_dyn.tools.identify.fourier_series import FourierSeries as FourierSeries
+from robot_dyn.tools.identify.information import Information as Information
+from robot_dyn.tools.identify.information import gram as gram
 from robot_dyn.tools.identify.log import Log as Log
 from robot_dyn.tools.identify.log import read_log as read_log
 from robot_dyn.tools.identify.physical import links_of as links_of

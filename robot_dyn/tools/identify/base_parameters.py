@@ -48,7 +48,7 @@ class BaseParameters(Value):
     @property
     def blind(self) -> tuple[str, ...]:
         """Names of the inertial parameters that no torque depends on."""
-        return tuple(name for name, used in zip(self.full_names, self.R.any(axis=0), strict=True) if not used)
+        return tuple(name for name, used in zip(self.full_names, np.abs(self.R).max(axis=0), strict=True) if not used)
 
 
 def base_parameters(arm: Robot, *, at_rest: bool = False) -> BaseParameters:

@@ -15,7 +15,7 @@ from robot_dyn.foundations import instance, number, numbers, several, shown
 from robot_dyn.report import processor_and_versions
 from robot_dyn.tools.identify.corrected import corrected
 from robot_dyn.tools.identify.estimation import COULOMB, VISCOUS, Estimate, Model, estimate, model_of
-from robot_dyn.tools.identify.log import LogError, read_log, swapped
+from robot_dyn.tools.identify.log import Log, LogError, read_log, swapped
 from robot_dyn.tools.identify.physical import Links, links_of, nearest_possible
 from robot_dyn.tools.identify.regression import Rows, fit, rms
 from robot_dyn.tools.identify.result import HeldOut, Identification, Parameter
@@ -25,7 +25,7 @@ from robot_dyn.tools.identify.verdict import verdict_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-_CUTOFF_HZ = 8.0
+CUTOFF_HZ = 8.0
 _SLOW = 0.05  # of the largest speed of a joint
 _TRAINING = 0.75  # part of the log, at its start, that fits the numbers of the held-out error
 _PERIODS = 10  # of the cutoff, in a log
@@ -41,7 +41,7 @@ def identify(
     reference: PiecewisePolynomial | None = None,
     gains: ArrayLike | None = None,
     effects: Iterable[Effect] | None = None,
-    cutoff_hz: float = _CUTOFF_HZ,
+    cutoff_hz: float = CUTOFF_HZ,
     slow: ArrayLike | None = None,
 ) -> Identification:
     """Estimate the parameters of an arm, its friction and offsets from a log of its motion.
@@ -72,19 +72,9 @@ def identify(
     2014; Wensing, Kim, Slotine 2018.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=LogError)
-    cutoff_hz = number("cutoff_hz", cutoff_hz, above=0, error=LogError)
     links, stated = links_of(arm), _friction(arm, effects)
     record = read_log(arm, log, reference, gains)
-    if not _PERIODS / np.ptp(record.t) <= cutoff_hz <= 0.5 / record.step_s:
-        raise LogError(
-            f"cutoff_hz must be from {_PERIODS / np.ptp(record.t):.3g} Hz, for {np.ptp(record.t):.4g} s, to"
-            f" {0.5 / record.step_s:.4g} Hz, half the rate of the log; got {cutoff_hz:g}"
-        )
-    model = model_of(arm)
-    signals = Signals(float(record.t[0]), record.step_s, len(record.t), cutoff_hz)
-    speed = np.abs(np.gradient(signals.first(record.q), record.step_s, axis=0)).max(axis=0)
-    least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
-    result = estimate(model, record, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
+    model, result = estimated(arm, record, cutoff_hz, slow)
     held_out = _held_out(model, result)
     _refuse_foreign(arm, result, held_out)
     r = len(model.base.columns)
@@ -110,6 +100,21 @@ def identify(
         robot=robot,
         urdf=text,
     )
+
+
+def estimated(arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None) -> tuple[Model, Estimate]:
+    """Return the linear model of an arm and its estimate from a log; for arguments and errors see `identify`."""
+    cutoff_hz = number("cutoff_hz", cutoff_hz, above=0, error=LogError)
+    if not _PERIODS / np.ptp(log.t) <= cutoff_hz <= 0.5 / log.step_s:
+        raise LogError(
+            f"cutoff_hz must be from {_PERIODS / np.ptp(log.t):.3g} Hz, for {np.ptp(log.t):.4g} s, to"
+            f" {0.5 / log.step_s:.4g} Hz, half the rate of the log; got {cutoff_hz:g}"
+        )
+    model = model_of(arm)
+    signals = Signals(float(log.t[0]), log.step_s, len(log.t), cutoff_hz)
+    speed = np.abs(np.gradient(signals.first(log.q), log.step_s, axis=0)).max(axis=0)
+    least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
+    return model, estimate(model, log, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
 
 
 def _friction(arm: Robot, effects: Iterable[Effect] | None) -> np.ndarray | None:
@@ -179,7 +184,7 @@ def _held_out(model: Model, found: Estimate) -> HeldOut:
 
 
 def _refuse_foreign(arm: Robot, found: Estimate, held_out: HeldOut) -> None:
-    ratio = np.sqrt((held_out.identified**2 / held_out.deviation**2).mean())
+    ratio = np.median(held_out.identified / held_out.deviation)  # one joint may have another cause, such as a tilt
     if not ratio <= _FOREIGN:
         raise LogError(
             f"the torques do not follow the equations of {arm.name}: with the best numbers the held-out error is"

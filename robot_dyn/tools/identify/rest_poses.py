@@ -145,7 +145,7 @@ def static(
         raise QueryError(f"poses have {poses.q.shape[1]} joints, {arm.name} has {arm.n}; give q in its order")
     sigma = None if noise is None else np.broadcast_to(numbers("noise", noise, (), (arm.n,), above=0), arm.n)
     if sigma is not None and not ((sigma >= _NOISE[0]) & (sigma <= _NOISE[1])).all():
-        raise QueryError(f"noise must be from {_NOISE[0]:g} to {_NOISE[1]:g}, got {np.ravel(noise).tolist()}")
+        raise QueryError(f"noise must be from {_NOISE[0]:g} to {_NOISE[1]:g}, got {sigma.tolist()}")
     bound = numbers("friction", arm.friction if friction is None else friction, (), (arm.n,), least=0)
     model = Gravity(arm, base_parameters(arm, at_rest=True), truth("tilt", tilt))
     rows = _rows(model, poses, np.broadcast_to(bound, arm.n))

@@ -104,35 +104,51 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
     """
     signals, rows, n = found.signals, found.rows, model.arm.n
     arm, state = model.arm.with_(armature=0.0), found.state
-    noise = found.fit.rms
     at_rest = np.concatenate([model.base.R @ arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]])
     r, own = len(at_rest), np.zeros(len(rows.names))
     own[:r] = at_rest
     if friction is not None:
         own[r : r + 2 * n] = friction.ravel()
-    w = (rows.used / noise).reshape(-1)
     shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
-    y = w * (shifted - rows.Y @ own).ravel()
+    candidates = []
+    for *name, columns in _candidates(arm, links, model, rows.Y, own, friction):
+        C = columns(*state)
+        C = (C if len(C) == len(rows.tau) else signals.second(C)).reshape(rows.tau.size, -1)
+        candidates.append((*name, C[:, np.abs(C).max(axis=0) > _NOTHING]))
+    y, used = (shifted - rows.Y @ own).ravel(), rows.used.reshape(-1)
+    noise = _noise(
+        y, np.column_stack([rows.Y.reshape(len(y), -1), *(C for *_, C in candidates)]), rows.used, found.fit.rms
+    )
+    w = used / np.broadcast_to(noise, rows.tau.shape).ravel()
+    y = w * y
     nuisance = rows.Y[..., r : r + 2 * n].reshape(-1, 2 * n) * w[:, None] if friction is None else np.zeros((len(w), 0))
-    count, full = int(rows.used.sum()), float(((found.fit.residuals / noise * rows.used) ** 2).sum())
+    count, full = int(used.sum()), float(used.sum())
     rest = y - _fitted(nuisance, y)[0]
     start = float(rest @ rest)
     ratios = np.sqrt((rest.reshape(-1, n) ** 2).sum(axis=0) / np.maximum(rows.used.sum(axis=0), 1))
     causes = []
-    for kind, where, unit, factor, columns in _candidates(arm, links, model, rows.Y, own, friction):
-        C = columns(*state)
-        C = C if len(C) == len(rows.tau) else signals.second(C)
-        C = C.reshape(len(w), -1) * w[:, None]
-        C = C[:, np.abs(C).max(axis=0) > _NOTHING * np.abs(w).max()]
-        if not C.shape[1]:  # for example gravity along the axes of all joints
+    for kind, where, unit, factor, columns in candidates:
+        if not columns.shape[1]:  # for example gravity along the axes of all joints
             continue
+        C = columns * w[:, None]
         fitted, x, covariance = _fitted(np.column_stack([C, nuisance]), y)
         k, chi2 = C.shape[1], float(((y - fitted) ** 2).sum())
         spread = 1.96 * np.sqrt(np.diag(covariance)[:k] * max(chi2 / count, 1.0))
         part = (start - chi2) / max(start - full, 1e-300)
-        scale = max(full / count, 1e-12)
-        causes.append(Cause(kind, where, x[:k] * factor, spread * factor, unit, part, chi2 / scale + k * np.log(count)))
+        causes.append(Cause(kind, where, x[:k] * factor, spread * factor, unit, part, chi2 + k * np.log(count)))
     return Verdict(ratios, tuple(sorted(causes, key=lambda cause: cause.bic)))
+
+
+def _noise(y: np.ndarray, columns: np.ndarray, used: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Return the rms of what the parameters and all causes together leave of y, (n,).
+
+    The residual of the estimate alone contains causes that no parameters stand for, such as the mounting.
+    """
+    w = (used / scale).ravel()
+    rest = (w * y - _fitted(columns * w[:, None], w * y)[0]).reshape(used.shape) * scale
+    free = used.sum() - np.linalg.matrix_rank(columns * w[:, None])
+    fraction = max(free / max(used.sum(), 1), 0.1)  # rows that columns do not fit away
+    return np.sqrt((rest**2).sum(axis=0) / np.maximum(used.sum(axis=0) * fraction, 1e-300))
 
 
 def _fitted(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

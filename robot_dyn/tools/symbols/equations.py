@@ -167,7 +167,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     needs("sympy", extra="symbols")
     if not isinstance(arm, Robot):
         raise QueryError(f"arm must be a Robot, for example rd.load('ur5'), got {shown(arm)}")
-    if letters not in ("file", "base", None):
+    if letters is not None and not (isinstance(letters, str) and letters in ("file", "base")):
         raise QueryError(f"letters must be 'file', 'base' or None, got {shown(letters)}")
     tree = tree_of(arm.description, arm.edits)
     locked = {joint.name for joint in tree.joints if joint.kind == "fixed" or joint.locked is not None}

@@ -11,10 +11,9 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.control import extreme_values
 from robot_dyn.foundations import PlanError
+from robot_dyn.tools.identify import FourierSeries, Information, gram
 from robot_dyn.tools.identify.base_parameters import base_parameters
 from robot_dyn.tools.identify.excitation import Problem, _limits
-from robot_dyn.tools.identify.fourier_series import FourierSeries
-from robot_dyn.tools.identify.information import Information, gram
 
 ARM = rd.load("planar_2r")
 LIMITS = {"velocity": 2.0, "acceleration": 9.0, "torque": 60.0, "lower": -2.0, "upper": 2.0}
