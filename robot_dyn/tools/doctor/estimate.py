@@ -30,8 +30,8 @@ def missing_inertials(
     """
     new = dict[str, Estimate]()
     if masses is not None:
-        shapes, unread = shapes_of_incomplete_links(description, package_dirs, masses.allow_overlap)
-        new = {estimate.link: estimate for estimate in estimates(description, shapes, masses, unread)[0]}
+        lacking, unread = shapes_of_incomplete_links(description, package_dirs, masses.allow_overlap)
+        new = {estimate.link: estimate for estimate in estimates(description, lacking, masses, unread)[0]}
     for name, shape in shapes.items():
         if name not in new and shape.unit is not None and document.named("link", name).find("inertial") is None:
             yield _finding(

@@ -157,8 +157,8 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
 
     Args:
         arm: Arm without mimic joints.
-        letters: "file" for a letter for each number of the file; "base" for numbers of the file with a letter for each
-            base inertial parameter, which are fewest; None for numbers only.
+        letters: "file" for a letter for each number of the file; "base" for numbers of the file with a letter for
+            gravity and each base inertial parameter, which are fewest; None for numbers only.
 
     Raises:
         MissingExtraError: If SymPy is not installed.
@@ -178,7 +178,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
                 f"joint {joint.name!r} follows {source!r}, and formulas need independent joints: lock it by"
                 f" arm.with_(lock={{{source!r}: 0.0}}), or remove its <mimic>"
             )
-    lettering = Lettering(named=letters == "file")
+    lettering = Lettering(named=letters == "file", with_g=letters is not None)
     lettered = lettering.tree(tree, arm.joint_names)
     meanings = dict(lettering.letters)
     inertias = _base_inertias(arm) if letters == "base" else {}

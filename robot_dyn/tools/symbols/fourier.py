@@ -14,6 +14,7 @@ from robot_dyn.tools.symbols.polynomials import ROOTS, Polynomial
 if TYPE_CHECKING:
     import sympy as sp
 
+_LONG = 1000  # with a larger denominator, the numbers of an expression are decimals
 Exponents = tuple[int, ...]
 Harmonic = tuple[bool, tuple[int, ...]]  # True for a cosine; multiples of the angles of a group
 Term = tuple[Exponents, tuple[Harmonic, ...]]
@@ -70,6 +71,7 @@ def expression(terms: Terms, names: tuple[str, ...], groups: tuple[tuple[str, ..
     import sympy as sp
 
     letter = {name: _generator(name) for name in names}
+    decimal = any(x.denominator > _LONG for x in terms.values())
     masses: dict[str, list[Any]] = defaultdict(list)
     for (key, harmonics), x in sorted(terms.items(), reverse=True):
         factors = [letter[name] ** power for name, power in zip(names, key, strict=True) if power]
@@ -79,8 +81,11 @@ def expression(terms: Terms, names: tuple[str, ...], groups: tuple[tuple[str, ..
         mass = next((name for name, p in zip(names, key, strict=True) if p == 1 and name[0] == "m" and name[1:]), "")
         if mass:
             factors.remove(letter[mass])
-        masses[mass].append(sp.Mul(sp.Rational(x.numerator, x.denominator), *factors))
-    sums = {mass: sp.factor_terms(sp.Add(*parts)) for mass, parts in masses.items()}  # common factors, no more
+        number = sp.Float(float(x), 15) if decimal and x.denominator > 1 else sp.Rational(x.numerator, x.denominator)
+        masses[mass].append(sp.Mul(number, *factors))
+    sums = {mass: sp.Add(*parts) for mass, parts in masses.items()}
+    if not decimal:
+        sums = {mass: sp.factor_terms(total) for mass, total in sums.items()}  # common factors, no more
     return sp.Add(*(sp.Mul(letter[mass], total) if mass else total for mass, total in sums.items()))
 
 

@@ -67,13 +67,15 @@ class Lettering:
     """A tree being lettered.
 
     Attributes:
-        named: True if lengths, masses, moments and gravity become letters; general angles always do.
+        named: True if lengths, masses and moments become letters; general angles always do.
+        with_g: True if the strength of gravity becomes the letter g.
         letters: Letters so far.
         angles: Names of letters that are angles.
         rounded: Angles read as multiples.
     """
 
     named: bool
+    with_g: bool = False
     letters: dict[str, Meaning] = field(default_factory=dict)
     angles: list[str] = field(default_factory=list)
     rounded: list[RoundedAngle] = field(default_factory=list)
@@ -130,10 +132,10 @@ class Lettering:
     def _gravity(self, gravity: Any) -> Any:
         """Return gravity by its strength g where it is along an axis: g is positive in textbooks."""
         values = [_value(x) for x in gravity]
-        if not self.named or sum(map(bool, values)) != 1:
+        if not self.with_g or sum(map(bool, values)) != 1:
             return self._vector("g", "", gravity, "gravity")
-        strength = self._number("g", sum(map(abs, values)), "gravity")
-        return tuple(replace(strength, negative=x < 0) if x else "0" for x in values)
+        self.letters["g"] = Meaning(float(sum(map(abs, values))), "gravity")
+        return tuple(replace(Letter("g"), negative=x < 0) if x else "0" for x in values)
 
     def _label(self, kind: str, body: int) -> str:
         """Return the number of a body; of further parts on it with b, c, …."""
@@ -181,4 +183,5 @@ class Lettering:
 
 
 def _value(literal: Any) -> Fraction:
-    return Fraction(literal) if isinstance(literal, str | int | Fraction) else Fraction(float(literal))
+    """Return a literal exactly; a float as its shortest decimal, as it was written."""
+    return Fraction(literal) if isinstance(literal, str | int | Fraction) else Fraction(repr(float(literal)))

@@ -105,7 +105,7 @@ def evaluated(matrix: Any, equations: SymbolicEquations, values: dict[str, float
 def pinocchio_model(equations: SymbolicEquations, values: dict[str, float]) -> tuple[Any, Any]:
     """Build a model joint by joint from the lettered tree, with the letters' values."""
     named = any(name[0] == "m" for name in values)
-    lettering = Lettering(named=named)
+    lettering = Lettering(named=named, with_g=named)
     arm = equations.arm
     tree = lettering.tree(tree_of(arm.description, arm.edits), arm.joint_names)
     every = {name: meaning.value for name, meaning in lettering.letters.items()} | values
