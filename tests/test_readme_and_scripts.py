@@ -152,6 +152,9 @@ EXTRAS = {
     "follow_a_recorded_motion.md": ("mcap_ros2",),
     "how_fast_can_it_go.md": ("ruckig", "toppra"),
     "identify_an_arm.md": ("cvxpy", "clarabel"),
+    "observers_and_lqg.md": ("control",),
+    "print_the_equations.md": ("sympy",),
+    "step_many_arms.md": ("gymnasium",),
     "sweep.md": ("pyarrow",),
 }
 
