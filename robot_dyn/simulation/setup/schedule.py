@@ -88,7 +88,7 @@ def near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def steps_on(length: float, step_s: float, record_every_s: float) -> int:
-    """Return the number of steps on a segment: none is longer than a record period; whole periods have equal steps."""
+    """Return the number of steps on a segment, at most a record period long each; whole periods have equal steps."""
     periods = round(length / record_every_s) if record_every_s else 0
     if periods and abs(length / record_every_s - periods) < _ROUNDED:
         return periods * max(1, ceil(record_every_s / step_s - _ROUNDED))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -40,6 +40,9 @@ from robot_dyn.tools.sweeps.statistics import Estimate
 from robot_dyn.tools.sweeps.statistics import text as number_text
 from robot_dyn.tools.sweeps.sweep import Sweep, heading
 from robot_dyn.tools.sweeps.work import OneByOne, Work
+
+if TYPE_CHECKING:
+    import pandas
 
 _SHOWN = 5  # number of listed reasons
 _WORST = 10  # number of runs in a report
@@ -91,7 +94,7 @@ class SweepResult(Answer):
         table["run"] = np.arange(self.sweep.runs)
         return {name: table[name] for name in names}
 
-    def to_pandas(self, *names: str) -> Any:
+    def to_pandas(self, *names: str) -> pandas.DataFrame:
         """Return `table` as a `pandas.DataFrame` with the number of the run as its index.
 
         Args:
