@@ -69,7 +69,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "Event": {"direction"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Rollouts.setup_of": {"run"}, "Robot.with_": {"lock", "armature"},
-    "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
+    "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"fill_value"},
     "joint_stops": {"lower", "upper"}, "plot": {"limits"},
     "path": {"acceleration", "effort", "velocity"}, "budget": {"continuous", "effort", "velocity"},
     "point_to_point": {"jerk", "velocity"},

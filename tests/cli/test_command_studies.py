@@ -18,7 +18,11 @@ SCENES = {"work-precision": SCENE.format('engine = "interpreted"'), "cost": SCEN
 METHODS = ("--method", "RK4", "--method", "Euler")
 FEW = {"work-precision": (*METHODS, "--repeats", "1", "--no-peers"), "cost": ("--budget", "0.2", "--repeats", "2")}
 FEW["certify"] = ("--samples", "100", "--repeats", "1")
-TABLES = {"work-precision": "method,engine", "cost": "group,name", "certify": "quantity,implementation,given,typical"}
+TABLES = {
+    "work-precision": "method,engine",
+    "cost": "group,name",
+    "certify": "quantity,implementation,at_state,typical",
+}
 
 
 @pytest.fixture

@@ -120,7 +120,7 @@ EDITS = {
     "a cached property": ("self.c**2", "self.c**3"),
     "a property": ("+ 0.125", "+ 0.375"),
     "a default of a field": ("= 0.25\n", "= 0.5\n"),
-    "what is declared of a coefficient": ("least=0", "least=1"),
+    "what is declared of a coefficient": ("minimum=0", "minimum=1"),
     "an operation": ("- halved(", "+ halved("),
     "a function inside": ("lambda x: x +", "lambda x: x *"),
     "a constant": ("q > 0.5", "q > 0.625"),

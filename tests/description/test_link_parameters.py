@@ -195,7 +195,7 @@ def test_numbers_that_no_link_has_are_refused(change, message: str) -> None:
     ("params", "message"),
     [
         ({f"{LINK}.mass": [1.0, 0.0]}, "left_lower.mass must be positive"),
-        ({"left_lowr.mass": [1.0]}, "no 'left_lowr.mass'; nearest: left_lower.mass"),
+        ({"left_lowr.mass": [1.0]}, "no parameter 'left_lowr.mass'; nearest: left_lower.mass"),
         ({f"{LINK}.inertia": [np.diag([1.0, 1.0, 3.0])]}, "is not physical"),
         ({f"{LINK}.inertia": [1.0]}, "left_lower.inertia"),
     ],

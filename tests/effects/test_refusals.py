@@ -86,7 +86,7 @@ IN_A_PLANT = [
     (lambda: plant(JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0), arm=CART), "lower must be less than upper"),
     (lambda: plant(ViscousFriction("urdf"), arm=rd.Lagrangian(CART)), "viscous='urdf' needs a Robot"),
     (lambda: plant(ViscousFriction("file"), arm=CART), "viscous must be real numbers"),
-    (lambda: rd.Plant(CART, "friction"), "give effects, or 'urdf'"),
+    (lambda: rd.Plant(CART, "friction"), "list of effects, or 'urdf'"),
     (lambda: plant(3), "3 is neither a Force nor a Bound"),
     (lambda: rd.Plant(object(), "urdf"), "must be a robot, such as rd.load"),
     (lambda: plant(RigidStops(7.0, "urdf"), arm=UR5), "lower must be less than upper"),

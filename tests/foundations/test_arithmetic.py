@@ -81,5 +81,5 @@ def test_a_longdouble_is_taken_exactly_by_a_ball() -> None:
 
 @pytest.mark.parametrize("dtype", ["float16", "int64", "nonsense", object, np.complex128])
 def test_an_unknown_arithmetic_is_refused(dtype) -> None:
-    with pytest.raises(QueryError, match="give float32, float64"):
+    with pytest.raises(QueryError, match="use float32, float64"):
         arithmetic_of(dtype)

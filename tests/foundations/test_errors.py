@@ -104,13 +104,16 @@ def test_an_error_in_another_process_arrives_as_it_was_raised() -> None:
     assert (str(there.value), there.value.joint) == (str(here.value), here.value.joint)
 
 
+NOT_COPIED = ("Event", "Adaptive.steps", "plot", "Stepper", "VectorEnv", "Env")
+
+
 def test_what_public_callables_return_survives_pickle_and_copy(known: dict[str, Example]) -> None:
-    """Except functions of the caller, figures of Matplotlib and balls of Arb, which are not the library's."""
+    """Except functions of the caller, figures of Matplotlib, balls of Arb, and lanes, which live in machine code."""
     for name, (function, arguments) in known.items():
         value = function(**arguments)
         if hasattr(value, "close"):
             value.close()
-        if not type(value).__module__.startswith("robot_dyn") or name in ("Event", "Adaptive.steps", "plot"):
+        if not type(value).__module__.startswith("robot_dyn") or name in NOT_COPIED:
             continue
         for other in (pickle.loads(pickle.dumps(value)), copy(value), deepcopy(value)):
             assert type(other) is type(value), name

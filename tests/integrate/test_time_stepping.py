@@ -251,7 +251,7 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
     assert abs(run.q[-1, 0]) <= 3e-3  # of a step at the velocity of the first impact
     named = rd.simulate(plant, [0.4], duration_s=2.0, method="DOP853")
     assert named.outcome.ending == "diverged"
-    assert "take method='MoreauJean'" in named.outcome.text
+    assert "use method='MoreauJean'" in named.outcome.text
 
 
 def test_a_run_far_beyond_its_stable_step_ends_as_diverged() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from string import Formatter
 
@@ -9,6 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
+from robot_dyn.foundations import json_text
 from robot_dyn.simulation import Doubt, DoubtKind
 from robot_dyn.simulation.results.doubts import _SENTENCES
 
@@ -42,7 +44,7 @@ def test_doubts_are_the_same_in_a_file_and_in_json(coarse: rd.Trajectory, tmp_pa
     again = rd.read(coarse.save(tmp_path / "run.npz"))
     assert coarse.error is not None and again.error is not None
     assert (again.error.ends_early, again.ledger.cause) == (coarse.error.ends_early, coarse.ledger.cause)
-    document = report.run(coarse)
+    document = json.loads(json_text(report.run(coarse)))
     rows = [*document["error_doubts"], document["ledger_doubt"]]
     doubts = [x for x in (coarse.error.ends_early, coarse.error.no_order, coarse.ledger.cause) if x]
     assert [(row["kind"], row["facts"], row["text"]) for row in rows] == [(x.kind, x.facts, x.text) for x in doubts]

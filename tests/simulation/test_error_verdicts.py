@@ -413,7 +413,7 @@ def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> 
     assert str(bounded) == f"about 2.0e-09 (bounded: {cut.text})"
     differ = Doubt(DoubtKind.COMPANIONS_DIFFER, {"limit": 0.1, "smaller_step_s": 1e-4})
     early = ErrorEstimate(t, error, 0.008, differ)
-    assert "take step_s = 1e-04" in early.note
+    assert "use step_s = 1e-04" in early.note
     assert str(early) == f"2.0e-09 up to t = 0.008 s (order seen); after that none: {early.note}"
 
 

@@ -224,7 +224,7 @@ def test_work_that_nothing_books_is_the_cause_of_a_ledger_that_does_not_close(ef
 def test_long_steps_are_the_cause_of_a_ledger_that_does_not_close() -> None:
     """Of order 1, at 20 ms, with all work booked: a quarter of the step, or a smaller tolerance, is the remedy."""
     run = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=0.6, method="Euler", step_s=0.02)
-    assert run.leak == "it does not close: the steps are too long for the motion; take step_s = 5e-03"
+    assert run.leak == "it does not close: the steps are too long for the motion; use step_s = 5e-03"
     finer = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=0.6, method="Euler", step_s=0.005)
     assert finer.ledger.closure < run.ledger.closure / 2
     loose = rd.integrate.Adaptive(rtol=3e-2, atol=1e-1)
@@ -239,7 +239,7 @@ def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_clos
         plant, [0.4, 0.2], [3.0, 2.0], duration_s=0.4, method="Rodas5PFixed", step_s=0.02, estimate_error=False
     )
     assert "does not close: joint 'joint_2' switches and switches back within 3 steps, at t = 0.1" in run.leak
-    assert run.leak.endswith("take step_s = 5e-03")
+    assert run.leak.endswith("use step_s = 5e-03")
 
 
 def test_rounding_at_rest_is_no_leak() -> None:

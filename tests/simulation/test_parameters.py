@@ -140,7 +140,10 @@ def test_sweeps_are_held_to_what_is_declared() -> None:
     for params, message in (
         ({"kp": [-1.0]}, "vary: kp must not be negative"),
         ({"gravity": [[0.0, 0.0]]}, r"vary: gravity must have shape \(B, 3\)"),
-        ({"viscous_friction.viscou": [1.0]}, "no 'viscous_friction.viscou'; nearest: viscous_friction.viscous"),
+        (
+            {"viscous_friction.viscou": [1.0]},
+            "no parameter 'viscous_friction.viscou'; nearest: viscous_friction.viscous",
+        ),
         ({"external_wrench.start_s": [0.1]}, "no 'external_wrench.start_s'"),
     ):
         with pytest.raises(QueryError, match=message):

@@ -98,7 +98,7 @@ def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> Non
 
 def test_a_batch_of_which_all_diverged_is_drawn(some_lost, tmp_path) -> None:
     plot(some_lost[5:6], "fan", "outcomes", "scatter", x="start q joint_1").save(tmp_path / "lost.png", dpi=40)
-    with pytest.raises(PlotError, match="no run that did not diverge"):
+    with pytest.raises(PlotError, match="every run diverged"):
         plot(some_lost[5:6], "histogram")
 
 

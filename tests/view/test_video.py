@@ -137,7 +137,7 @@ REFUSED = {
     "a width and a height": {"size": 640},
     "dark must be": {"dark": 1},
     "on_progress must be": {"on_progress": 1},
-    "not the suffix": {"path": "x.webm"},
+    "not a suffix": {"path": "x.webm"},
     "no folder": {"path": "nowhere/x.mp4"},
     "is not a program": {"browser": "nowhere/chrome"},
 }

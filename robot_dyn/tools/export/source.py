@@ -320,7 +320,7 @@ _DESCRIPTIONS = {
 }
 
 _HEADER = """\
-/* {robot}: M(q) a + C(q, v) v + N = tau in {real}, written by robot_dyn {version}.
+/* {robot}: tau = M(q) a + C(q, v) v + N in {real}, written by robot_dyn {version}.
  *
  * No heap, no static data: functions may run in any thread or interrupt. Results may overlap arguments. Arguments are
  * not checked; they must be finite. Functions of <math.h>: {math}.

@@ -22,7 +22,7 @@ def identify(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Identify inertia and friction of an arm from a log of its motion.
+    """Identify inertia and friction of an arm from a log.
 
     Columns of the log: t [s]; "q JOINT", "tau JOINT" or, with --gains, "current JOINT"; "desired JOINT" if known.
 

@@ -1,6 +1,6 @@
 """The verdict: ranked causes of the difference between an arm's file and a log.
 
-    r = τ − Y θ_file,   χ²(cause) = min_x ‖W (r − C x)‖²,   BIC = χ² + k log N
+    r = τ − Y θ_file,   S(cause) = min_x ‖W (r − C x)‖²,   BIC = S + k log N
 
 C are the derivatives of the torque by the cause. Causes whose BIC differs by less than 6 are not distinguished by
 the log and are named together. [Schwarz 1978; Kass, Raftery 1995]
@@ -44,7 +44,7 @@ class Cause(Value):
         half_widths: Half widths of their 95 % intervals.
         unit: Unit of the coefficients.
         explained: Part of the difference that it explains, of what the whole model explains.
-        bic: χ² + k log N.
+        bic: S + k log N.
     """
 
     kind: str

@@ -187,7 +187,7 @@ def make_chunk(ticket: Ticket, chunk: int) -> None:
     """Run a chunk and write it, unless its file exists."""
     folder, work, t = _work(ticket)
     if not folder.file(chunk).exists():
-        folder.write(chunk, *work.made(*folder.run_range(chunk), t))
+        folder.write(chunk, *work.run_rows(*folder.run_range(chunk), t))
 
 
 def _answer(ticket: Ticket) -> str:

@@ -167,7 +167,7 @@ class Turn:
 @final
 @dataclass(frozen=True, eq=False)
 class Polynomials(Arithmetic):
-    """The ring ℚ[letters, c, s, √2, √3] modulo the relations of this module.
+    """The ring of rational polynomials in letters, c, s, √2 and √3, modulo the relations of this module.
 
     Attributes:
         letters: Names of letters, rates and sliding coordinates.

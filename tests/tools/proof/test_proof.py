@@ -380,7 +380,7 @@ def test_a_run_is_confirmed_to_the_digits_that_it_has() -> None:
     elsewhere = rd.simulate(replace(setup, q0=q + 1e-12))
     with pytest.raises(QueryError, match="starts from another state"):
         elsewhere.proven_digits(made)
-    with pytest.raises(QueryError, match="of the joints"):
+    with pytest.raises(QueryError, match="has the joints"):
         rd.simulate(rd.load("pendulum"), q0=[0.1], duration_s=0.01).proven_digits(made)
     heavier = rd.simulate(replace(setup, plant=rd.Plant(robot.with_(payload=rd.Payload("tip", 0.01)))))
     assert heavier.proven_digits(made) < 5

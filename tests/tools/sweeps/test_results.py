@@ -300,7 +300,7 @@ WRONG: dict[str, dict[str, Any]] = {
     "needs a joint": {"figures": {"mine": sw.final("q")}},
     "no joint 'elbow'; known: joint_1, joint_2": {"figures": {"mine": sw.peak("u", "elbow")}},
     "the arm has no payload": {"vary": {"payload_mass:tool0": sw.uniform(low=0, high=3)}},
-    "no 'kq'; ": {"vary": {"kq": sw.uniform(low=0, high=3)}},
+    "no parameter 'kq'; ": {"vary": {"kq": sw.uniform(low=0, high=3)}},
     "q0 has 2 numbers, got a distribution of 1": {"vary": {"q0": sw.uniform(low=0, high=3)}},
     "nothing varies": {"vary": {}},
     "vary: kp: a distribution must be": {"vary": {"kp": 3.0}},
