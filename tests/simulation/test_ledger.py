@@ -229,7 +229,7 @@ def test_long_steps_are_the_cause_of_a_ledger_that_does_not_close() -> None:
     assert finer.ledger.closure < run.ledger.closure / 2
     loose = rd.integrate.Adaptive(rtol=3e-2, atol=1e-1)
     run = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=3.0, method=loose)
-    assert run.leak == "it does not close: the tolerance is too loose; take rtol = 3e-04"
+    assert run.leak == "it does not close: the tolerance is too loose; use rtol = 3e-04"
 
 
 def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_close() -> None:

@@ -144,7 +144,7 @@ def test_sweeps_are_held_to_what_is_declared() -> None:
             {"viscous_friction.viscou": [1.0]},
             "no parameter 'viscous_friction.viscou'; nearest: viscous_friction.viscous",
         ),
-        ({"external_wrench.start_s": [0.1]}, "no 'external_wrench.start_s'"),
+        ({"external_wrench.start_s": [0.1]}, "no parameter 'external_wrench.start_s'"),
     ):
         with pytest.raises(QueryError, match=message):
             rd.rollouts(base, vary=params)

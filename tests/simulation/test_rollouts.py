@@ -370,9 +370,11 @@ def test_what_has_no_meaning_is_refused() -> None:
         "the same number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
         r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"vary": {"mass_scale": 1.1}},
         "no parameter 'kq'; nearest: k": {"vary": {"kq": ones}},
-        "no 'viscous_friction.visc'; nearest: viscous_friction.viscous": {"vary": {"viscous_friction.visc": ones}},
+        "no parameter 'viscous_friction.visc'; nearest: viscous_friction.viscous": {
+            "vary": {"viscous_friction.visc": ones}
+        },
         "kp must not be negative": {"vary": {"kp": [-1.0]}},
-        r"no 'payload_mass:elbow': the arm has no payload; add one with robot.with_\(payload=": {
+        r"no parameter 'payload_mass:elbow': the arm has no payload; add one with robot.with_\(payload=": {
             "vary": {"payload_mass:elbow": ones}
         },
         "velocity_scale": {"vary": {"regularised_coulomb_friction.velocity_scale": np.zeros(2)}},

@@ -31,7 +31,7 @@ def work_precision(
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
-    """Measure computing time against accuracy, by method and program.
+    """Measure computing time against accuracy, by method and peer.
 
     The table lists the time for a number of correct digits. Ctrl-C ends the measurement and keeps finished runs.
 

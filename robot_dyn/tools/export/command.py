@@ -31,7 +31,7 @@ def export_c(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Write the equations of an arm, or of the plant of a scene, as C.
+    """Write the equations of an arm, or of a scene, as C.
 
     The folder then holds a header, a source file, CMakeLists.txt and a self-test for ctest.
 
