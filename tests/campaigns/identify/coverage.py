@@ -1,4 +1,4 @@
-"""Coverage of the intervals of `identify` on simulated logs: python -m tests.campaigns.identification ur5 10 20.
+"""Coverage of the intervals of `identify` on simulated logs: python -m tests.campaigns.identify.coverage ur5 10 20.
 
 Each file, friction and motion is random; it runs with several seeds of noise, in closed loop, with one tick of delay.
 """
