@@ -18,7 +18,7 @@ from robot_dyn.description import parameter_names
 from robot_dyn.foundations import Value, read_only
 
 _STATES = 400
-_DEPENDENT = 1e-8  # remainder of a unit column after projection: far above rounding, far below that of any arm
+_DEPENDENT = 1e-8  # remainder of a unit column after projection: far above rounding, far below independent columns
 _NEGLIGIBLE = 1e-7  # fraction of the largest entry of R
 
 

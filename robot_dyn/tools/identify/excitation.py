@@ -145,13 +145,13 @@ def excite(
     """Plan the motion within limits that shows the most about base parameters and friction.
 
     It maximises the log determinant of their information matrix and is the best of several starts; the result is a
-    local maximum. Torques are those of the arm without friction: leave room for friction in the torque limits.
+    local maximum. Torques are computed without friction: leave room for friction in the torque limits.
 
     Args:
         arm: The robot; its parameters are used for the torque limits only.
         duration_s: Duration T, in [s].
         limits: Limits by "lower", "upper", "velocity", "acceleration" and "torque", each a number, (n,) or by joint; by
-            default those of the robot's file. Joints without position limits stay within half a turn to each side.
+            default the limits of the robot's file. Joints without position limits stay within half a turn to each side.
         box: Lower and upper corner of the region for the origin of `tool`, (2, 3), in [m] in the base; by default none.
         tool: Name of the link or joint that stays in the box.
         fraction: Fraction of the limits that the motion may use.

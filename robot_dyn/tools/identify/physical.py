@@ -1,4 +1,4 @@
-"""Physical parameters of links: nearest to those of the file where the log does not determine them.
+"""Physical parameters of links: nearest to the file's where the log does not determine them.
 
     min ‖L (R θ − π)‖² + Σ_i ‖S_i (P_i(θ) − P_i(θ_file)) S_i‖²/σ²,   S_i = P_i(θ_file)^(−1/2)
     subject to   P_i(θ) = [[½ tr(I) 1 − I, m c], [(m c)ᵀ, m]] ⪰ 0
@@ -55,7 +55,7 @@ class Links(Value):
 
 
 def links_of(arm: Robot) -> Links:
-    """Return the links of an arm whose numbers are those of its file.
+    """Return the links of an arm with the numbers of its file.
 
     Raises:
         LogError: If the arm has payloads or edited masses.

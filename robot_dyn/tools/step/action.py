@@ -108,7 +108,7 @@ def action_of(controller: Controller | None, joints: tuple[str, ...], period_s: 
         period_s: Time between actions, in [s].
 
     Raises:
-        QueryError: If the controller has no set-point, or its period does not divide that of the actions.
+        QueryError: If the controller has no set-point, or its period does not divide the period of the actions.
     """
     if controller is None:
         return Action(HeldTorque(np.zeros(len(joints)), period_s), "torque_of_lane", joints)

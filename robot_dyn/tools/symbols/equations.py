@@ -237,7 +237,7 @@ def _named(equations: SymbolicEquations) -> SymbolicEquations:
 def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[Any]]]]:
     """Return the letters of each body's base parameters, and its 𝓜 in them, by joint.
 
-    The letters are those of Gautier and Khalil (1990): M mass, MX first moment, XX second moment in the joint's frame.
+    The letters follow Gautier and Khalil (1990): M mass, MX first moment, XX second moment in the joint's frame.
     """
     lettering = Lettering(named=False)  # the same angles as in the formulas, in floats
     tree = lettering.tree(tree_of(arm.description, arm.edits), arm.joint_names)
