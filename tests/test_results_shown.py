@@ -157,7 +157,11 @@ def test_the_repr_of_what_is_around_results_is_short(name: str) -> None:
     assert len(text) < 800 and "array(" not in text and "0x" not in text
 
 
-SETUP = "import numpy as np, robot_dyn as rd\narm, q = rd.load('planar_2r'), np.array([0.3, 0.4])"
+SETUP = """
+import numpy as np, robot_dyn as rd
+from tests.tools.identify import logs
+arm, q = rd.load('planar_2r'), np.array([0.3, 0.4])
+"""
 
 
 def executed(*cells: str) -> Any:

@@ -74,7 +74,7 @@ def test_rosenbrock_bounces_off_a_stop_whatever_its_stiffness(stiffness: float) 
 @pytest.mark.parametrize(
     ("method", "verdict"),
     [
-        *long([(rd.integrate.Adaptive(), "is stiff[:;] take Rodas5P, softer effects")]),
+        *long([(rd.integrate.Adaptive(), "is stiff: use Rodas5P, softer effects")]),
         (rd.integrate.method("GaussLegendre2"), "do not converge.*use a smaller step, or a method for stiff systems"),
     ],
     ids=["DOP853", "GaussLegendre2"],
