@@ -18,6 +18,7 @@ from robot_dyn.tools.identify.verdict import Verdict as Verdict
 __all__: list[str]
 
 # Names that only tools and tests import.
+from robot_dyn.tools.identify.estimation import Estimate as Estimate
 from robot_dyn.tools.identify.estimation import Model as Model
 from robot_dyn.tools.identify.estimation import estimate as estimate
 from robot_dyn.tools.identify.estimation import model_of as model_of
