@@ -59,7 +59,7 @@ def kinematics(effort: Effort) -> None:
     """Placement and Jacobian of the hand of 512 arms against four steps of them."""
     lanes = 64 if effort.quick else 512
     plant, q, u = plant_and_torques(lanes)
-    arms, fast = rd.tools.step.Stepper(plant, lanes, period_s=4 * STEP_S, step_s=STEP_S), rd.compiled(plant.dynamics)
+    arms, fast = rd.tools.step.Stepper(plant, lanes, period_s=4 * STEP_S, step_s=STEP_S), rd.compiled(panda())
     now = arms.reset(q)
 
     def four() -> None:
