@@ -31,5 +31,7 @@ from robot_dyn.tools.identify.physical import links_of as links_of
 from robot_dyn.tools.identify.physical import nearest_possible as nearest_possible
 from robot_dyn.tools.identify.physical import pseudo_inertia as pseudo_inertia
 from robot_dyn.tools.identify.regression import Fit as Fit
+from robot_dyn.tools.identify.regression import Rows as Rows
+from robot_dyn.tools.identify.regression import fit as fit
 from robot_dyn.tools.identify.signals import Signals as Signals
 from robot_dyn.tools.identify.signals import low_pass as low_pass

@@ -16,8 +16,10 @@ from robot_dyn.tools.identify import (
     Fit,
     Identification,
     LogError,
+    Rows,
     Signals,
     estimate,
+    fit,
     identify,
     links_of,
     low_pass,
@@ -26,7 +28,6 @@ from robot_dyn.tools.identify import (
     pseudo_inertia,
     read_log,
 )  # fmt: skip
-from robot_dyn.tools.identify.regression import Rows, fit
 from tests.command import spawn
 from tests.tools.identify import logs
 
