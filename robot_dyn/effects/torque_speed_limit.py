@@ -21,6 +21,7 @@ from robot_dyn.effects.effect import Bound, Effect
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import (
     ROWS,
+    CoefficientField,
     OptionalCoefficientField,
     coefficient,
     default,
@@ -56,26 +57,37 @@ class TorqueSpeedLimit(Bound):
         >>> rd.effects.TorqueSpeedLimit(speed=[0.0, 200.0, 350.0], torque=[0.4, 0.4, 0.0], at="motor", gear_ratio=100.0)
     """
 
-    speed: Any = field(metadata=coefficient("rad/s", symbol="ω", shapes=ROWS, minimum=0, can_vary=False))
-    torque: Any = field(metadata=coefficient("N m", symbol="τ", shapes=ROWS, minimum=0, infinite=True, can_vary=False))
+    speed: CoefficientField = field(metadata=coefficient("rad/s", symbol="ω", shapes=ROWS, minimum=0, can_vary=False))
+    torque: CoefficientField = field(
+        metadata=coefficient("N m", symbol="τ", shapes=ROWS, minimum=0, infinite=True, can_vary=False)
+    )
     at: str = "joint"
     gear_ratio: OptionalCoefficientField = field(
         default=default(None), metadata=coefficient(symbol="N", exclusive_minimum=0, fill_value=1.0, can_vary=False)
     )
 
     # at the joint, on the joints of an arm: (n,); corners (k, n); slopes and floors of max(±v − ω_k, floor), (2, k, n)
-    _peak: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", can_vary=False))
-    _corners: Any = field(
-        default=None, init=False, repr=False, metadata=coefficient("rad/s", shapes=(("k", "n"),), can_vary=False)
+    _peak: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient("N m", can_vary=False)
     )
-    _slopes: Any = field(
-        default=None, init=False, repr=False, metadata=coefficient(shapes=((2, "k", "n"),), can_vary=False)
+    _corners: OptionalCoefficientField = field(
+        default=default(None),
+        init=False,
+        repr=False,
+        metadata=coefficient("rad/s", shapes=(("k", "n"),), can_vary=False),
     )
-    _floors: Any = field(
-        default=None, init=False, repr=False, metadata=coefficient(shapes=((2, "k", "n"),), can_vary=False)
+    _slopes: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(shapes=((2, "k", "n"),), can_vary=False)
     )
-    _limit: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
-    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient(can_vary=False))
+    _floors: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(shapes=((2, "k", "n"),), can_vary=False)
+    )
+    _limit: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
+    _middle: OptionalCoefficientField = field(
+        default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
+    )
 
     term = "|u| ≤ τ(|v|)"
     of_velocity = True
@@ -83,7 +95,7 @@ class TorqueSpeedLimit(Bound):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_place(self.at, self.gear_ratio is not None, EffectError)
-        speed, torque = self.speed, self.torque
+        speed, torque = self._stated
         if isinstance(speed, Mapping) != isinstance(torque, Mapping):
             raise EffectError("speed and torque must both be by joint name, or both be numbers; give both alike")
         if isinstance(speed, Mapping) and speed.keys() != torque.keys():
@@ -97,9 +109,14 @@ class TorqueSpeedLimit(Bound):
             if self.at == "joint":
                 check_speed(f"{self.name}{name}", float(x[-1]), EffectError)
 
+    @property
+    def _stated(self) -> tuple[Any, Any]:
+        """Speeds and torques: arrays, or arrays by joint name."""
+        return self.speed, self.torque
+
     def _lines(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
         """Yield the polylines, with the part of a message that names the joint."""
-        speed, torque = self.speed, self.torque
+        speed, torque = self._stated
         if isinstance(speed, Mapping):
             yield from ((f" of {name}", (x, torque[name])) for name, x in speed.items())
         elif np.shape(speed) != np.shape(torque):
@@ -113,8 +130,8 @@ class TorqueSpeedLimit(Bound):
         if self._peak is not None:
             return resolved
         lines = [line for _, line in self._lines()]
-        if isinstance(self.speed, Mapping):
-            by_name = dict(zip(self.speed, lines, strict=True))
+        if isinstance(stated := self._stated[0], Mapping):
+            by_name = dict(zip(stated, lines, strict=True))
             lines = [by_name.get(name, _NO_LIMIT) for name in dynamics.joint_names]
         lines *= dynamics.n if len(lines) == 1 else 1
         if len(lines) != dynamics.n:
@@ -137,31 +154,41 @@ class TorqueSpeedLimit(Bound):
         floors, limit = np.zeros((2, *slopes.shape)), np.where(limited, 1.0, inf)
         return with_values(resolved, tables | {"_floors": floors, "_limit": limit, "speed": speed, "torque": torque})
 
+    @property
+    def _tables(self) -> tuple[Any, ...]:
+        """Peaks, corners, slopes, floors, and limit and middle of the saturation."""
+        if self._peak is None:
+            raise EffectError(f"{self.name}: a plant determines the limits of joints; use rd.Plant(robot, [effect])")
+        return self._peak, self._corners, self._slopes, self._floors, self._limit, self._middle
+
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         if self._peak is None:
             return ()
+        _, corners, slopes, _, limit, middle = self._tables
         levels = {
-            (i, sign * float(self._corners[k, i]) + 0.0): None
-            for (way, k, i) in np.argwhere(self._slopes != 0).tolist()
+            (i, sign * float(corners[k, i]) + 0.0): None
+            for (way, k, i) in np.argwhere(slopes != 0).tolist()
             for sign in ((1, -1)[way],)
         }
-        corners = (Threshold(i, x, "torque–speed corner", "passed", "left", of_velocity=True) for i, x in levels)
-        return (*corners, *limits_reached(self._limit, self._middle, n))
+        passed = (Threshold(i, x, "torque–speed corner", "passed", "left", of_velocity=True) for i, x in levels)
+        return (*passed, *limits_reached(limit, middle, n))
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
-        slopes, floors = self._slopes.copy(), self._floors.copy()
+        _, corners, slopes, floors, limit, _ = self._tables
+        slopes, floors = slopes.copy(), floors.copy()
         for threshold, side in sides.items():
             if threshold.of_velocity:
                 i = threshold.joint
                 for way, sign in enumerate((1, -1)):
-                    here = self._corners[:, i] == sign * threshold.level
+                    here = corners[:, i] == sign * threshold.level
                     (floors if side * sign > 0 else slopes)[way, here, i] = -inf if side * sign > 0 else 0.0
-        limit, middle = piece(self._limit, n, {x: side for x, side in sides.items() if x.of_actuation})
+        limit, middle = piece(limit, n, {x: side for x, side in sides.items() if x.of_actuation})
         return with_values(self, {"_slopes": slopes, "_floors": floors, "_limit": limit, "_middle": middle})
 
     def actuation(self, u: Array, v: Array) -> Array:  # pyright: ignore[reportIncompatibleMethodOverride]
         middle, half = self._range(v)
-        return middle + saturated(u - middle, half * self._limit, half * self._middle)
+        *_, limit, place = self._tables
+        return middle + saturated(u - middle, half * limit, half * place)
 
     def limited(self, u: Array, v: Array) -> Array:
         """Return the place of u between both limits at v, −1 at the lower and 1 at the upper one; 0 in the middle."""
@@ -170,14 +197,11 @@ class TorqueSpeedLimit(Bound):
 
     def _range(self, v: Array) -> tuple[Array, Array]:
         """Return middle and half width of the allowed actuation, which is at least half of the peak."""
-        if self._peak is None:
-            raise EffectError(
-                f"{self.name}: the limits of joints are determined by a plant; use rd.Plant(robot, [effect])"
-            )
+        peak, corners, slopes, floors, *_ = self._tables
         upper, lower = (
-            self._peak
-            + sum(s * np.maximum(sign * v - x, low) for x, s, low in zip(self._corners, slopes, floors, strict=True))
-            for sign, slopes, floors in zip((1, -1), self._slopes, self._floors, strict=True)
+            peak
+            + sum(s * np.maximum(sign * v - x, low) for x, s, low in zip(corners, of_side, low_of_side, strict=True))
+            for sign, of_side, low_of_side in zip((1, -1), slopes, floors, strict=True)
         )
         return (upper - lower) / 2, (upper + lower) / 2
 

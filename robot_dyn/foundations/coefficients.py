@@ -23,7 +23,7 @@ from robot_dyn.foundations.validate import instance, number, numbers, truth
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    CoefficientInput = ArrayLike | Mapping[str, float]  # numbers, values by joint name, or "urdf"
+    CoefficientInput = ArrayLike | Mapping[str, ArrayLike]  # numbers, values by joint name, or "urdf"
 
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
 URDF_SOFT = "urdf_soft"  # as the position of a stop: the soft limit in the robot's file
@@ -31,6 +31,7 @@ _KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
 ROWS = (("k",), ("n", "k"))  # a list of numbers for all joints, or one for each joint
 
+Checked = float | np.ndarray | Mapping[str, float] | Mapping[str, np.ndarray] | str
 Owner = TypeVar("Owner")  # an effect, controller or reference
 
 
@@ -120,7 +121,7 @@ class Coefficient:
         """True if the coefficient is a list for all joints, or one for each joint."""
         return self.shapes == ROWS
 
-    def checked(self, name: str, values: object, *, error: type[RobotDynError], allow_unresolved: bool) -> Any:
+    def checked(self, name: str, values: object, *, error: type[RobotDynError], allow_unresolved: bool) -> Checked:
         """Return the checked numbers, as a frozen copy or as a float.
 
         If `allow_unresolved`, values by joint name and "urdf" are returned unchanged; `on` resolves them for an arm.
@@ -134,10 +135,8 @@ class Coefficient:
             if self.of_joints:
                 return values
             rows = replace(self, shapes=(("k",),))
-            return {
-                joint: rows.checked(f"{name} of {joint}", row, error=error, allow_unresolved=False)
-                for joint, row in values.items()
-            }
+            options: dict[str, Any] = {"error": error, "allow_unresolved": False}
+            return {joint: np.asarray(rows.checked(f"{name} of {joint}", x, **options)) for joint, x in values.items()}
         if allow_unresolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
         if allow_unresolved and self.stated in ("lower", "upper") and isinstance(values, str) and values == URDF_SOFT:
@@ -155,7 +154,9 @@ class Coefficient:
         )
         return float(array) if self.shapes == ((),) else array
 
-    def on(self, name: str, values: ArrayLike | Mapping[str, float], dynamics: Jointed) -> ArrayLike:
+    def on(
+        self, name: str, values: ArrayLike | Mapping[str, float], dynamics: Jointed
+    ) -> ArrayLike | Mapping[str, float]:
         """Return the numbers for the joints of an arm; values by joint name or "urdf" become (n,).
 
         Raises:
