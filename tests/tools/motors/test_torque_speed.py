@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
-from robot_dyn.tools.motors.torque_speed import TorqueSpeed
+from robot_dyn.tools.motors import TorqueSpeed
 from tests.effects.test_effect_states import MASS, SLIDER
 
 ARM = rd.load("planar_2r")
