@@ -153,13 +153,9 @@ class SlotineLi(rd.control.Controller):
 def test_a_controller_with_the_regressor_of_slotine_and_li_compiles() -> None:
     """Both loops take the same fixed steps: 1e-12 for 50 of them."""
     robot = rd.load("planar_2r")
-    ends = [
-        rd.simulate(
-            rd.Plant(robot), [0.3, -0.8], controller=SlotineLi(robot, robot.inertial_parameters), method="RK4", step_s=0.01, duration_s=0.5,
-            engine=engine,
-        ).q[-1]
-        for engine in ("compiled", "interpreted")
-    ]  # fmt: skip
+    law, fixed = SlotineLi(robot, robot.inertial_parameters), {"method": "RK4", "step_s": 0.01, "duration_s": 0.5}
+    loops = ("compiled", "interpreted")
+    ends = [rd.simulate(robot, [0.3, -0.8], controller=law, engine=loop, **fixed).q[-1] for loop in loops]
     np.testing.assert_allclose(*ends, rtol=0, atol=1e-12)
     assert np.abs(ends[0]).max() < 0.4
 
