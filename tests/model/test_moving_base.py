@@ -1,4 +1,4 @@
-"""An arm on joints that move like its base, against Pinocchio's free flyer with the base's velocity and acceleration."""
+"""An arm on joints that move like its base, against a free flyer of Pinocchio with the same motion of the base."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_torques_on_a_moving_base_are_those_of_a_free_flyer(name: str) -> None:
     moving = on_moving_base(arm)
     tau = moving.inverse_dynamics(np.append(np.zeros(6), q), np.append(base_v, v), np.append(base_a, a))
     (x, y, z), spin = base_v[3:], base_v[3:]
-    angular = base_a[3:] + [y * z, -x * z, x * y]
+    angular = base_a[3:] + np.array([y * z, -x * z, x * y])
     linear = base_a[:3] - np.cross(spin, base_v[:3])
     flyer = pin.buildModelFromXML(arm.description.text.decode(), pin.JointModelFreeFlyer())
     place = pin.integrate(flyer, pin.neutral(flyer), np.append(np.zeros(6), q))
