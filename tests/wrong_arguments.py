@@ -37,11 +37,11 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
-    "ExpectedPrecision", "HeldOut", "Identification", "InverseKinematics", "Meaning", "MotorBudget", "Motors",
-    "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference",
-    "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations",
-    "Trajectory", "Verdict", "WorkPrecision",
+    "Advice", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate",
+    "Excitation", "ExpectedPrecision", "HeldOut", "Identification", "InverseKinematics", "Meaning", "MotorBudget",
+    "Motors", "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "RobotDifference", "Rollouts",
+    "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress",
+    "SweepResult", "SymbolicEquations", "Trajectory", "Verdict", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -265,6 +265,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
             density=1000.0, allow_overlap=False, units=True,
             inertia_unit="kg mm2", xacro=None),
+        call(rd.tools.doctor.diff_robots, a=robot, b=robot, joints={"slide": "slide"}, signs={"slide": -1},
+            offsets={"hinge": 0.1}, tolerance=0.5, samples=3, seed=3),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
         call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), minimum=0.5, exclusive_minimum=0.5,

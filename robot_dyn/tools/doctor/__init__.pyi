@@ -1,6 +1,8 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.tools.doctor.checkup import Checkup as Checkup
 from robot_dyn.tools.doctor.checkup import check_urdf as check_urdf
+from robot_dyn.tools.doctor.robot_difference import RobotDifference as RobotDifference
+from robot_dyn.tools.doctor.robot_difference import diff_robots as diff_robots
 
 __all__: list[str]
 
