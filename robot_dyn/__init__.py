@@ -16,8 +16,10 @@ costs) and tools (doctor of files, motors, sweeps, proofs, stress tests, steps, 
 
 from __future__ import annotations
 
+from robot_dyn.foundations import missing_packages
 from robot_dyn.foundations.public import public_names
 
+missing_packages.install()
 _public, _, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]
 
 

@@ -1,13 +1,13 @@
 """Benchmarks, both sides in one run: medians over repeats that take turns. Only ratios of one run count.
 
 Subjects: queries (Robot over bare Pinocchio), first (the first run of a process), compiled (against Pinocchio's C++),
-rollouts (against MuJoCo), parameters (numbers as inputs of machine code over constants), growth (cost against the
-number of joints), iftomm (problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff
-dampers and springs), sticking (time stepping of dry friction and stops against the event-driven limit, beside MuJoCo),
-precision (time against error, all methods beside SciPy, MuJoCo, Drake and heyoka), energy (of a long run), estimates
-(of errors, beside true ones), proofs (radius and time of proven runs), plans (of motions: beside ruckig, paths at their
-limits, poses reached, beside pin-pink), sweeps (coverage of the intervals of each design). What accuracy costs in other
-scenes: work_precision.py.
+rollouts (against MuJoCo), steps (with an action per lane, over rollouts), parameters (numbers as inputs of machine code
+over constants), growth (cost against the number of joints), iftomm (problems A01 and A05 of the IFToMM library of
+multibody benchmarks), stiff (joints with stiff dampers and springs), sticking (time stepping of dry friction and stops
+against the event-driven limit, beside MuJoCo), precision (time against error, all methods beside SciPy, MuJoCo, Drake
+and heyoka), energy (of a long run), estimates (of errors, beside true ones), proofs (radius and time of proven runs),
+plans (of motions: beside ruckig, paths at their limits, poses reached, beside pin-pink), sweeps (coverage of the
+intervals of each design). What accuracy costs in other scenes: work_precision.py.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from benchmarks import (
     proofs,
     queries,
     rollouts,
+    steps,
     sticking,
     stiff,
     sweeps,
@@ -41,6 +42,7 @@ SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
     "first": (first_run.first_run,),
     "compiled": (kernels.kernels, kernels.from_python, kernels.threads, kernels.first_use),
     "rollouts": (rollouts.one_step, rollouts.thousands, rollouts.sticking),
+    "steps": (steps.steps, steps.kinematics),
     "parameters": (parameters.parameters,),
     "growth": (growth.growth, growth.memory),
     "iftomm": (iftomm.iftomm,),

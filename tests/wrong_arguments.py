@@ -279,7 +279,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.gains_from, inertia_diagonal=[1.0, 2.0], bandwidth_rad_s=3.0, damping_ratio=0.9),
         call(rd.control.hold, q=q),
         call(rd.control.inverse_kinematics, arm=robot, pose=robot.placement(q, "pole"), frame="pole", q0=q, seed=1,
-            starts=2, tolerance=1e-9, iterations=5),
+            starts=2, tolerance=1e-9, iterations=5, tool_axis=[0.0, 0.0, 1.0]),
         call(rd.control.line, p0=[0.1, 0.2, 0.3], p1=[0.4, 0.2, 0.1], duration_s=1.0, rotation=eye, rotation_end=eye,
             start_s=0.1),
         call(rd.linearise, plant=plant, q=q, v=v, u=u, z=[], t=0.1),

@@ -43,12 +43,16 @@ __getattr__, __dir__, _ = public_names(__spec__)
 def main() -> None:
     """Entry point: run the command; report errors in one line."""
     from robot_dyn.cli.interrupts import guard, ignore
+    from robot_dyn.foundations.errors import MissingExtraError
 
     guard()
     try:
         code = _run()
     except KeyboardInterrupt:
         code = 130
+    except MissingExtraError as error:  # of the command line itself
+        print(f"robot-dyn: error: {error}", file=sys.stderr)
+        code = 2
     ignore()
     if code == 130:
         print("robot-dyn: interrupted", file=sys.stderr)

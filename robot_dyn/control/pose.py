@@ -2,8 +2,9 @@
 
     e = log(g(q)⁻¹ g_d),   de = −J_b dq  to first order of e
 
-e is the body twist (v, ω) that takes the frame to the pose in unit time. [Murray, Li, Sastry 1994, ch. 2 §3.2;
-Siciliano et al. 2009, sec. 3.7]
+e is the body twist (v, ω) that takes the frame to the pose in unit time. If the frame may spin about its axis a, ω is
+the shortest rotation of a to the desired direction d, both in body axes: ω = θ (a × d)/sin θ, with two components.
+[Murray, Li, Sastry 1994, ch. 2 §3.2; Siciliano et al. 2009, sec. 3.7]
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ _SOUGHT = 1e-11  # largest ‖e‖ of a descent, in [m] and [rad]: below usual t
 _ROTATION = 1e-6  # largest entry of RᵀR − 1 for a rotation
 _SAME = 1e-4  # [rad] or [m]: solutions closer than this count as one
 _FAR = 100.0  # [m]: a pose further away may be in [mm]
+FIXED, SPHERE = np.zeros((0, 3)), np.eye(3)  # axes about which the frame may spin: none, all
 _RANK = 1e-9  # relative to the largest entry of J
 
 
@@ -53,13 +55,16 @@ class InverseKinematics(Answer, Value):
         q: The solution nearest to q0; without a solution, the position of the smallest ‖e‖², in which 1 rad counts as
             much as 1 m. Shape (n,), in [rad] or [m].
         position_error: Distance of the frame's origin from the pose at q, in [m].
-        rotation_error: Angle between the frame and the pose at q, in [rad]; nan if the orientation is free.
+        rotation_error: Angle between the frame and the pose at q, in [rad]; for a direction, the angle between it and
+            the tool axis; nan if the orientation is free.
         converged: True if both errors are within the tolerance.
         held_by: Limits that keep the frame from coming nearer to the pose, in words; empty if it converged.
         solutions: All solutions, the nearest to q0 first, (k, n).
         starts: Number of starts.
         first: Number of the first start that converged, from 1; 0 if none did.
-        redundancy: Number of directions in which the joints may move at q with the frame at rest.
+        redundancy: Number of directions in which the joints may move at q without leaving the pose.
+        moving_joints: Number of joints that move the frame.
+        conditions: Number of conditions of the pose: 6, or 5 with the spin free, or 3 with the orientation free.
     """
 
     arm: str
@@ -75,6 +80,8 @@ class InverseKinematics(Answer, Value):
     starts: int
     first: int
     redundancy: int
+    moving_joints: int
+    conditions: int
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -85,7 +92,8 @@ class InverseKinematics(Answer, Value):
         return len(self.solutions) == 1
 
     def blocks(self) -> Iterator[Block]:
-        turn = "orientation free" if np.isnan(self.rotation_error) else f"{self.rotation_error:.2g} rad"
+        spin = " to its tool axis, spin free" if self.conditions == 5 else ""
+        turn = "orientation free" if np.isnan(self.rotation_error) else f"{self.rotation_error:.2g} rad{spin}"
         reached = "is at" if self.converged else "does not reach"
         yield f"{self.arm}: {self.frame} {reached} the pose, to {self.position_error:.2g} m, {turn}"
         units = [of_joint("rad", kind) for kind in self.joint_types]
@@ -96,11 +104,14 @@ class InverseKinematics(Answer, Value):
             yield f"held by {', '.join(self.held_by)}" if self.held_by else free
             if not np.isnan(self.rotation_error):
                 yield "q minimises the sum of both squared errors, where 1 rad counts as 1 m"
+            if self.moving_joints < self.conditions == 6:
+                yield f"{self.moving_joints} joints move {self.frame}, and its pose has 6 conditions"
+                yield "if the tool may spin about its axis, give the direction of this axis instead of the rotation"
             yield f"best of {self.starts} starts; to be surer, give q0 near a solution, or more starts"
             return
         others = len(self.solutions) - 1
-        more = f"; {self.redundancy} directions are free" if self.redundancy else ""
-        yield f"{others or 'no'} other solution{'s' * (others != 1)} from {self.starts} starts{more}"
+        free = f"; {self.redundancy} direction{'s' * (self.redundancy != 1)} of motion left" if self.redundancy else ""
+        yield f"{others or 'no'} other solution{'s' * (others != 1)} from {self.starts} starts{free}"
 
 
 def inverse_kinematics(
@@ -113,6 +124,7 @@ def inverse_kinematics(
     starts: int = 20,
     tolerance: float = 1e-9,
     iterations: int = 100,
+    tool_axis: ArrayLike = (0, 0, 1),
 ) -> InverseKinematics:
     """Compute joint positions within the limits that bring a frame to a pose.
 
@@ -122,10 +134,15 @@ def inverse_kinematics(
     reaches the pose, the result minimises ‖e‖² = ‖v‖² + ‖ω‖², a compromise between position and rotation in which 1 rad
     counts as much as 1 m.
 
+    A direction instead of a rotation leaves the spin about the tool axis free: for arms with five axes, and for tools
+    that may spin, such as torches. Elsewhere this is the mask (1, 1, 1, 1, 1, 0) in tool axes, or a tolerance of π
+    about the z axis. None instead of a rotation is the mask (1, 1, 1, 0, 0, 0), or position-only inverse kinematics.
+
     Args:
         arm: The robot.
         pose: Pose of the frame in base axes, as `arm.placement` returns it, (4, 4); or a pair of a position, (3,), in
-            [m], and a rotation, (3, 3), or None to leave the orientation free.
+            [m], and a rotation, (3, 3), or the direction of the tool axis in base axes, (3,), or None to leave the
+            orientation free.
         frame: Name of a link.
         q0: The first start, (n,) or by joint name, in [rad] or [m]; by default the middle between the limits, or 0
             without limits.
@@ -133,6 +150,7 @@ def inverse_kinematics(
         starts: Number of starts, including q0.
         tolerance: Largest error of position, in [m], and of rotation, in [rad], at a solution.
         iterations: Largest number of evaluations for each start.
+        tool_axis: Axis of the frame that a direction applies to, in frame axes, (3,).
 
     Raises:
         PlanError: If the pose is invalid, or q0 is outside the limits.
@@ -142,7 +160,7 @@ def inverse_kinematics(
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
     choice("frame", frame, arm.frame_names)
-    start, (pose, turns) = _start(arm, q0), _pose(pose)
+    start, (pose, free) = _start(arm, q0), _pose(pose, _unit("tool_axis", tool_axis))
     rng = np.random.default_rng(integer("seed", seed, most=2**128 - 1))
     starts, most = (
         integer("starts", starts, least=1, most=10_000),
@@ -153,22 +171,47 @@ def inverse_kinematics(
     q = np.array([start, *(np.where(moving, arm.random_configuration(rng), start) for _ in range(starts - 1))])
 
     def residual(q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return error_and_jacobian(arm, frame, pose[None], q, turns)
+        return error_and_jacobian(arm, frame, pose[None], q, free)
 
     descent = descend(residual, q, arm.lower, arm.upper, tolerance=min(_SOUGHT, tolerance), most=most)
     return _best(arm, frame, start, pose, descent, tolerance, int(moving.sum()))
 
 
 def error_and_jacobian(
-    arm: Robot, frame: str, g: np.ndarray, q: np.ndarray, turns: bool = True
+    arm: Robot, frame: str, g: np.ndarray, q: np.ndarray, free: np.ndarray = FIXED
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return e = log(g(q)⁻¹ g), (B, 6), and the body Jacobian, (B, 6, n); without `turns` only the position rows."""
+    """Return e, (B, m), and −∂e/∂q to first order of e, (B, m, n), with m the number of conditions.
+
+    Args:
+        arm: The robot.
+        frame: Name of the frame.
+        g: Poses, (B, 4, 4).
+        q: Positions, (B, n).
+        free: Axes about which the frame may spin, in frame axes: none, (0, 3), one, (1, 3), or all, (3, 3).
+    """
     here = arm.placement(q, frame)
     J, R_back = arm.jacobian(q, frame, expressed_in=Axes.BODY), transpose(here[:, :3, :3])
-    p = (R_back @ (g[:, :3, 3] - here[:, :3, 3])[..., None])[..., 0]
-    if not turns:
-        return p, J[:, :3]
-    return logarithm(R_back @ g[:, :3, :3], p), J
+    p, R = (R_back @ (g[:, :3, 3] - here[:, :3, 3])[..., None])[..., 0], R_back @ g[:, :3, :3]
+    if not len(free):
+        return logarithm(R, p), J
+    across = _orthogonal(free)
+    if len(free) == 1:
+        p = np.concatenate([p, _shortest(free[0], R @ free[0]) @ across.T], axis=1)
+    return p, np.concatenate([J[:, :3], across @ J[:, 3:]], axis=1)
+
+
+def _shortest(a: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Compute the rotation vectors of the shortest rotations that take a unit vector to others, (B, 3)."""
+    turn = np.cross(a, d)
+    sine = np.linalg.norm(turn, axis=-1, keepdims=True)
+    # to the opposite direction, all axes orthogonal to a are as short
+    axis = np.where(sine > 0, turn / np.where(sine > 0, sine, 1), _orthogonal(a[None])[0])
+    return np.arctan2(sine, (d @ a)[..., None]) * axis
+
+
+def _orthogonal(axes: np.ndarray) -> np.ndarray:
+    """Return orthonormal rows orthogonal to k orthonormal axes, (3 − k, 3)."""
+    return np.linalg.svd(axes)[2][len(axes) :]
 
 
 def logarithm(R: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -197,10 +240,11 @@ def _best(
     best = order[0] if len(order) else int((descent.e**2).sum(axis=1).argmin())
     J = descent.J[best]
     held_by = () if len(order) else _limits(arm, q[best], at_bound(q[best], descent.e[best], J, arm.lower, arm.upper))
+    rank = int(np.linalg.matrix_rank(J, tol=_RANK * np.abs(J).max(initial=0.0)))
     return InverseKinematics(
         *(arm.name, arm.joint_names, arm.joint_types, frame, q[best], float(length[best]), float(angle[best])),
         *(bool(len(order)), held_by, _distinct(q[order]), len(q), int(good[0]) + 1 if len(good) else 0),
-        redundancy=moving - int(np.linalg.matrix_rank(J, tol=_RANK * np.abs(J).max(initial=0.0))),
+        *(moving - rank, moving, len(J)),
     )
 
 
@@ -236,13 +280,16 @@ def _start(arm: Robot, q0: Any) -> np.ndarray:
     return q0
 
 
-def _pose(pose: Any) -> tuple[np.ndarray, bool]:
-    """Return the pose as a matrix (4, 4), orthogonal to rounding, and False if the orientation is free."""
+def _pose(pose: Any, tool_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pose as a matrix (4, 4), orthogonal to rounding, and the axes about which the frame may spin."""
     if isinstance(pose, tuple) and len(pose) == 2:
         p, R = numbers("the position of the pose", pose[0], (3,), error=PlanError), pose[1]
         if R is None:
-            return homogeneous(np.eye(3), p), False
-        R = numbers("the rotation of the pose", R, (3, 3), error=PlanError)
+            return homogeneous(np.eye(3), p), SPHERE
+        R = numbers("the rotation of the pose", R, (3, 3), (3,), error=PlanError)
+        if R.ndim == 1:
+            d = _unit("the direction of the pose", R)  # only R a = d is compared, not all of R
+            return homogeneous(np.outer(d, tool_axis), p), tool_axis[None]
     else:
         g = numbers("pose", pose, (4, 4), error=PlanError)
         R, p = g[:3, :3], g[:3, 3]
@@ -253,7 +300,16 @@ def _pose(pose: Any) -> tuple[np.ndarray, bool]:
         fault = f"RᵀR differs from 1 by {off:.2g}" if off > _ROTATION else "its determinant is −1"
         raise PlanError(f"pose: its 3 × 3 part is not a rotation, {fault}; give an orthogonal matrix of determinant 1")
     U, _, V = np.linalg.svd(R)
-    return homogeneous(U @ V, p), True
+    return homogeneous(U @ V, p), FIXED
+
+
+def _unit(label: str, axis: Any) -> np.ndarray:
+    """Return a direction as a unit vector; raise a PlanError if it is zero."""
+    axis = numbers(label, axis, (3,), error=PlanError)
+    largest = np.abs(axis).max()
+    if not largest > 0:
+        raise PlanError(f"{label} must not be zero; give a vector along it, of any length, such as (0, 0, -1)")
+    return axis / largest / np.linalg.norm(axis / largest)
 
 
 def _moving(arm: Robot, frame: str, rng: np.random.Generator) -> np.ndarray:

@@ -61,7 +61,9 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     except (OSError, RuntimeError, ValueError) as error:  # too long, not readable, no such user, or a NUL
         why = getattr(error, "strerror", error)
         raise CatalogError(f"no file {shorten(text)!r}: {why}; give the path of a URDF file") from None
-    raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+    raise CatalogError(
+        f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file{_without_data()}"
+    )
 
 
 def _is_path(text: str) -> bool:
@@ -140,6 +142,11 @@ def _own_folder() -> Path:
     package = Path(__file__).parents[1]
     inside = package / "urdf"
     return inside if inside.is_dir() else package.parent / "urdf"
+
+
+def _without_data() -> str:
+    """Return what to install for robots of other makers; empty if it is installed."""
+    return "" if any(_example_robot_data()) else "; more robots: pip install example-robot-data"
 
 
 def _example_robot_data() -> Iterator[tuple[str, Path]]:

@@ -58,8 +58,8 @@ class EditError(RobotDynError):
     """An edit of a robot (lock, payload, armature, gravity) that cannot be applied."""
 
 
-class MissingExtraError(RobotDynError):
-    """A required optional package is not installed."""
+class MissingExtraError(RobotDynError, ImportError):
+    """A required package is not installed."""
 
 
 class PlanError(RobotDynError):

@@ -4,7 +4,7 @@
 
 Stages are stored as differences from the first, because Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. One b_j is
 rounded so that Σ b_j c_j is ½ to the last bit; free fall would otherwise gain 1e-15 of its energy in each step. Three
-further stages give the dense output where it is needed. The coefficients are SciPy's.
+further stages give the dense output where it is needed.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5, II.6 and II.10]
 """
@@ -13,23 +13,17 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cache
-from importlib.util import find_spec
-from pathlib import Path
-from runpy import run_path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array, Scalar
+from robot_dyn.integrate import dop853_coefficients as table
 from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
 from robot_dyn.integrate.step_control import ControlledStepper
 
-if TYPE_CHECKING:
-    from scipy.integrate import DOP853
-
-_STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
+_STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = table.STAGES, table.EXTENDED, 7, 8
 
 
 class Coefficients(NamedTuple):
@@ -71,14 +65,10 @@ class Work(NamedTuple):
 
 @cache
 def coefficients() -> Coefficients:
-    """Return SciPy's coefficients for differences of the stages."""
-    scipy = table()
-    a = np.zeros((_EXTENDED, _EXTENDED))
-    a[:_STAGES, :_STAGES], a[_STAGES + 1 :] = scipy.A, scipy.A_EXTRA
-    a[_STAGES, :_STAGES] = scipy.B
-    c = np.concatenate([scipy.C, [1.0], scipy.C_EXTRA])
+    """Return the coefficients for differences of the stages."""
+    a, c = table.A.copy(), table.C
     a[:, 0] = c  # Σ_j a_ij = c_i, so this is the weight of k₁
-    b, d, e3, e5 = (np.array(x) for x in (scipy.B, scipy.D, scipy.E3[:_STAGES], scipy.E5[:_STAGES]))
+    b, d, e3, e5 = table.B.copy(), table.D.copy(), table.E3.copy(), table.E5.copy()
     b[0], d[:, 0], e3[0], e5[0] = 1.0, 0.0, 0.0, 0.0
     smallest = int(np.flatnonzero(b)[np.argmin(np.abs(b[b != 0]))])  # its spacing of floats is the finest
     b[smallest] += float(
@@ -88,23 +78,6 @@ def coefficients() -> Coefficients:
     end = np.zeros(_STAGES + 1)
     end[[0, _STAGES]] = 1.0
     return Coefficients(a=a, b=b, c=c, e3=e3, e5=e5, d=d, end=end)
-
-
-def table() -> SimpleNamespace | type[DOP853]:
-    """Return SciPy's table, read from its file, because importing `scipy.integrate` is slower than machine code."""
-    package = find_spec("scipy")
-    try:
-        assert package is not None
-        file = Path((package.submodule_search_locations or [""])[0], "integrate", "_ivp", "dop853_coefficients.py")
-        names, s = run_path(str(file)), _STAGES
-        A, B, C, D, E3, E5 = (names[name] for name in ("A", "B", "C", "D", "E3", "E5"))
-    except (AssertionError, KeyError, OSError):  # SciPy stores it elsewhere
-        from scipy.integrate import DOP853
-
-        return DOP853
-    return SimpleNamespace(
-        A=A[:s, :s], B=B, C=C[:s], D=D, E3=E3, E5=E5, A_EXTRA=A[s + 1 :], C_EXTRA=C[s + 1 :]
-    )  # fmt: skip
 
 
 def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:

@@ -15,7 +15,7 @@ from typing import NamedTuple, final
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, Scalar
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
-from robot_dyn.integrate.dop853 import table
+from robot_dyn.integrate import dop853_coefficients as table
 from robot_dyn.integrate.integrator import FixedStepper, PlainMethod, RightSide, States
 from robot_dyn.integrate.primitives import combination, evaluate
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients
@@ -129,10 +129,10 @@ RK4 = ExplicitRungeKutta(
 def dp8() -> ExplicitRungeKutta:
     """Return the method of order 8 with 12 stages of Dormand and Prince, at a fixed step.
 
-    The coefficients are SciPy's, rounded to float64. In longdouble they limit the accuracy of a step to about 1e-16 h.
+    The coefficients are rounded to float64. In longdouble they limit the accuracy of a step to about 1e-16 h.
 
     Source: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5 and II.10.
     """
-    scipy = table()
-    a = tuple(tuple(map(float, row[:i])) for i, row in enumerate(scipy.A))
-    return ExplicitRungeKutta("DP8", ButcherTableau(a, tuple(map(float, scipy.B)), tuple(map(float, scipy.C)), order=8))
+    a = tuple(tuple(map(float, row[:i])) for i, row in enumerate(table.A[: table.STAGES]))
+    b, c = (tuple(map(float, x[: table.STAGES])) for x in (table.B, table.C))
+    return ExplicitRungeKutta("DP8", ButcherTableau(a, b, c, order=8))

@@ -32,7 +32,7 @@ _READY = (
     MoreauJean(),
 )
 
-# Factories for the methods; DP8 reads SciPy's coefficients only when it is used.
+# Factories for the methods; DP8 builds its tableau only when it is used.
 METHODS: Mapping[str, Callable[[], Integrator | Adaptive]] = MappingProxyType(
     {
         **{ready.name: lambda ready=ready: ready for ready in _READY},

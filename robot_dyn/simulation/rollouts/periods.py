@@ -53,9 +53,8 @@ class Periods:
             0 in (*program.outputs, *(x for op in program.ops for x in op.operands)) for program in programs
         )
         tiles = -(-len(batch) // LANES)
-        self._ticks = (
-            round(setup.duration_s / setup.controller.period_s) if setup.controller and equation.sampled else 0
-        )
+        controller = setup.controller  # noise is redrawn at each tick
+        self._ticks = round(setup.duration_s / controller.period_s) if controller and controller.deviates else 0
         self._numbers = np.minimum(np.arange(tiles * LANES), len(batch) - 1)  # a tile that is not full repeats a run
         numbers = self._numbers.reshape(tiles, LANES)
         parameters = [code.run_parameters({name: x[row] for name, x in batch.sweep.items()}) for row in numbers]
@@ -92,7 +91,10 @@ class Periods:
                 arguments = code.code.addresses, stepper.coefficients, stepper.work
                 loop = Loop(table, runs, records, config, position)
                 calls.append(partial(code.machine_loop.calls(), *arguments, loop, np.zeros(1, np.int64)))
-            self._workers.append((position, calls))
+            counters = position.budget.base  # of all integer fields
+            assert counters is not None
+            position.budget[0] = np.iinfo(np.int64).max
+            self._workers.append((counters, counters.copy(), calls))
 
     @property
     def work(self) -> int:
@@ -135,7 +137,8 @@ class Periods:
             inputs: Values of the parameter, (B, size).
             periods: Number of periods since the start of each run, which selects its noise, (B,).
         """
-        self._keys[:, 2] = (periods * self._ticks)[self._numbers].reshape(-1, LANES)
+        if self._ticks:
+            self._keys[:, 2] = (periods * self._ticks)[self._numbers].reshape(-1, LANES)
         rows = inputs if len(inputs) == len(self._numbers) else inputs[self._numbers]
         self._inputs[...] = rows.reshape(len(self._y), LANES, -1).transpose(0, 2, 1)
         self._y[:, self.work :] = 0.0
@@ -143,10 +146,8 @@ class Periods:
         shared(partial(self._run, left), len(self._workers), 1, len(self._workers))
 
     def _run(self, tiles: Iterator[int], first: int, last: int) -> int:
-        for position, calls in self._workers[first:last]:
+        for counters, start, calls in self._workers[first:last]:
             for tile in tiles:
-                for counter in position[:-1]:
-                    counter[0] = 0
-                position.budget[0] = np.iinfo(np.int64).max
+                counters[...] = start
                 calls[tile]()
         return 0
