@@ -2,7 +2,6 @@
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange as EulerLagrange
 from robot_dyn.lagrange.formulas import FORMULAS as FORMULAS
 from robot_dyn.lagrange.generalized_force import lagrangian_of_particles as lagrangian_of_particles
-from robot_dyn.lagrange.linkage import Body as Body
 from robot_dyn.lagrange.linkage import Linkage as Linkage
 from robot_dyn.lagrange.linkage import Pose as Pose
 from robot_dyn.lagrange.linkage import linkage_of as linkage_of
