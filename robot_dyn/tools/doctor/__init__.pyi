@@ -8,5 +8,7 @@ __all__: list[str]
 
 # Names that only tools and tests import.
 from robot_dyn.tools.doctor.checkup import checked as checked
+from robot_dyn.tools.doctor.coordinate_map import Basis as Basis
+from robot_dyn.tools.doctor.coordinate_map import Obstacle as Obstacle
 from robot_dyn.tools.doctor.document import Document as Document
 from robot_dyn.tools.doctor.finding import Severity as Severity

@@ -11,8 +11,7 @@ from lxml import etree
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError, rotation, rotation_rpy, rpy_of
-from robot_dyn.tools.doctor import RobotDifference
-from robot_dyn.tools.doctor.coordinate_map import Basis, Obstacle
+from robot_dyn.tools.doctor import Basis, Obstacle, RobotDifference
 from tests.command import run
 
 GRAVITY = float(-rd.load("planar_2r").gravity[2])  # [m/s²]
