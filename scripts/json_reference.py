@@ -32,6 +32,7 @@ from robot_dyn.simulation.rollouts.parameters import Parameters
 from robot_dyn.tools.doctor.checkup import Checkup
 from robot_dyn.tools.doctor.robot_difference import RobotDifference
 from robot_dyn.tools.export.source import CSource
+from robot_dyn.tools.identify.result import Identification
 from robot_dyn.tools.motors.motor_budget.fastest import FastestMotion
 from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
@@ -163,6 +164,7 @@ DOCUMENTS = (
     ),
     Document("check-urdf FILE…", None, {"files": Key("One entry for each file.", tuple[Checkup, ...])}),
     Document("diff-robots A B", RobotDifference),
+    Document("identify ROBOT LOG", Identification),
     Document("certify ROBOT", Certificate),
     Document("prove SCENE.toml", Proof),
     Document("stress ROBOT", Stress),

@@ -241,7 +241,7 @@ class CompiledPlant(NamesNearest):
                 "N": lambda: equation.dynamics.N(qs) - torque,
                 "inverse_dynamics": lambda: equation.dynamics.inverse_dynamics(qs, vs, us) - torque,
                 "forward_dynamics": lambda: equation.acceleration(
-                    qs, vs, equation.on_joints(equation.actuation(us)) + torque
+                    qs, vs, equation.on_joints(equation.actuation(us, vs)) + torque
                 ),
             }
             answer = column(formulas[quantity]())

@@ -3,7 +3,7 @@
     friction           ViscousFriction, RegularisedCoulombFriction, DryFriction, LuGreFriction, DahlFriction
     stops and springs  joint_stops (JointStopSpring, JointStopDamper), RigidStops, Spring
                        LineSpringDamper (LineSpring, LineDamper): between two points
-    drives             EffortLimit, ActuatorLag, SeriesElastic, RigidBacklash
+    drives             EffortLimit, TorqueSpeedLimit, ActuatorLag, SeriesElastic, RigidBacklash
     loads              ExternalWrench, CarriedPayload
     to write one       Conservative, Dissipative, Active, Bound, Stateful, Drive, SetValued: base classes of Effect
                        coefficient, Threshold, Layer: declarations of an effect; Dynamics: its first argument

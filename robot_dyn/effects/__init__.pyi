@@ -31,6 +31,7 @@ from robot_dyn.effects.set_valued import Interval as Interval
 from robot_dyn.effects.set_valued import Mode as Mode
 from robot_dyn.effects.set_valued import SetValued as SetValued
 from robot_dyn.effects.spring import Spring as Spring
+from robot_dyn.effects.torque_speed_limit import TorqueSpeedLimit as TorqueSpeedLimit
 from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
 from robot_dyn.foundations.coefficients import coefficient as coefficient
 from robot_dyn.foundations.threshold import Layer as Layer
@@ -44,3 +45,6 @@ from robot_dyn.effects.causes import Causes as Causes
 from robot_dyn.effects.causes import exerted_torques as exerted_torques
 from robot_dyn.effects.causes import torques_by_cause as torques_by_cause
 from robot_dyn.effects.effect import numbered as numbered
+from robot_dyn.effects.torque_speed_limit import AT as AT
+from robot_dyn.effects.torque_speed_limit import check_line as check_line
+from robot_dyn.effects.torque_speed_limit import check_speed as check_speed

@@ -254,12 +254,19 @@ class Bound(Effect, ABC):
         def actuation(self, u): ...                    # the bounded actuation for u, (..., n), in [N m] or [N]
         def thresholds(self, n): ...                   # () if it is smooth everywhere
 
-    Contract: see `Effect`.
+    A bound that depends on the velocity sets `of_velocity = True` and defines actuation(u, v). Contract: see `Effect`.
     """
+
+    of_velocity: ClassVar[bool] = False
+    """True if `actuation` also takes the velocity v, (..., n): the bound then acts between ticks as well."""
 
     @abstractmethod
     def actuation(self, u: Array) -> Array:
         """Return the bounded actuation for u, (..., n), in [N m] or [N]."""
+
+    def limited(self, u: Array, v: Array) -> Array:
+        """Return the values that thresholds of the actuation compare with their levels, (..., n); u by default."""
+        return u
 
     largest: ClassVar[Any] = inf
     """Largest bounded |u|, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""

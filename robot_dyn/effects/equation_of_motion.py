@@ -74,6 +74,12 @@ class EquationOfMotion:
         for i in joints:
             if joints.count(i) > 1:
                 raise EffectError(f"joint {self.dynamics.joint_names[i]!r} has two drives; keep one")
+        if drives and (bound := next((x for x in self.effects if isinstance(x, Bound) and x.of_velocity), None)):
+            drive = next(iter(drives.values()))
+            raise EffectError(
+                f"{bound.name} limits motors that turn with their joints, but those of {drive.name} do not; remove one"
+                " of the two"
+            )
         return drives
 
     def on_joints(self, u: Array) -> Array:
@@ -123,44 +129,45 @@ class EquationOfMotion:
                 f"{force.name} does not fit {self.dynamics.n} joints and v of shape {v.shape}: {error}"
             ) from None
 
-    def actuation(self, u: Array) -> Array:
-        """Return the actuation after all bounds without states, in the order of the effects.
+    def actuation(self, u: Array, v: Array) -> Array:
+        """Return the actuation at velocity v after all bounds without states, in the order of the effects.
 
         Raises:
             EffectError: If a bound does not fit the shape of u.
         """
         for k, effect in enumerate(self.effects):
             if isinstance(effect, Bound) and k not in self.states:
-                u = self._bounded(effect, u)
+                u = self._bounded(effect, u, v)
         return u
 
     @cached_property
     def _lags(self) -> int:
-        """Index of the first bound with states: only the bounds before it act before the actuation is sampled."""
-        return next((k for k in self.states if isinstance(self.effects[k], Bound)), len(self.effects))
+        """Index of the first bound with states or of the velocity: only bounds before it act before sampling."""
+        bounds = ((k, effect) for k, effect in enumerate(self.effects) if isinstance(effect, Bound))
+        return next((k for k, bound in bounds if k in self.states or bound.of_velocity), len(self.effects))
 
     def commanded(self, u: Array) -> Array:
-        """Return the actuation after the bounds before the first one with states."""
-        return self.applied(u, u, range(self._lags))[0]
+        """Return the actuation after the bounds before the first one with states or of the velocity."""
+        return self.applied(u, u, u, range(self._lags))[0]
 
     @cached_property
     def bounds_at_all_times(self) -> range:
-        """Indices of the effects whose bounds also act between ticks: from the first bound with states onwards."""
+        """Indices of the effects whose bounds also act between ticks: those after the bounds of `commanded`."""
         return range(self._lags, len(self.effects))
 
-    def applied(self, u: Array, z: Array, of: range | None = None) -> tuple[Array, Mapping[int, Array]]:
-        """Return the actuation after the remaining bounds, at states z, and the actuation that enters each bound."""
+    def applied(self, u: Array, v: Array, z: Array, of: range | None = None) -> tuple[Array, Mapping[int, Array]]:
+        """Return the actuation after the remaining bounds, at v and states z, and that which enters each bound."""
         reached = {}
         for k in self.bounds_at_all_times if of is None else of:
             effect = self.effects[k]
             if isinstance(effect, Bound):
                 reached[k] = u
-                u = self._bounded(effect, u, *self._states_of(k, u, u, z))
+                u = self._bounded(effect, u, v, *self._states_of(k, u, u, z))
         return u, reached
 
-    def _bounded(self, bound: Bound, u: Array, *states: Array) -> Array:
+    def _bounded(self, bound: Bound, u: Array, v: Array, *states: Array) -> Array:
         try:
-            return call(bound.actuation, u, *states)
+            return call(bound.actuation, u, *((v,) if bound.of_velocity else ()), *states)
         except (TypeError, ValueError) as error:
             if users_line(error):
                 raise

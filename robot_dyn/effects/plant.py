@@ -111,10 +111,16 @@ class Plant(NamesNearest, Caching):
         """The effects that exert a torque."""
         return self.equation_of_motion.forces
 
-    def actuation(self, u: Array) -> Array:
-        """Return the actuation u, (..., n), after all bounds; raise an EffectError if a bound does not fit."""
+    def actuation(self, u: Array, v: Array | None = None) -> Array:
+        """Return the actuation u, (..., n), after all bounds at velocity v, 0 by default.
+
+        Raises:
+            EffectError: If a bound does not fit.
+        """
         (u,) = (u,) if self._is_plain(u) else self._states(u=u)
-        return self.equation_of_motion.actuation(u)
+        v = 0 * u if v is None else v
+        (v,) = (v,) if self._is_plain(v) else self._states(v=v)
+        return self.equation_of_motion.actuation(u, v)
 
     def M(self, q: Array, *, t: float | None = None) -> Array:
         """Return the mass matrix, (..., n, n), with the payloads carried at time t in [s]."""
@@ -163,7 +169,7 @@ class Plant(NamesNearest, Caching):
     def forward_dynamics(self, q: Array, v: Array, u: Array, *, t: float | None = None) -> Array:
         """Return the acceleration under the actuation u, (..., n)."""
         equation = self.at(t).equation_of_motion
-        total = equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t)
+        total = equation.on_joints(self.actuation(u, v)) + self.torque(q, v, t=t)
         if not equation.set_valued:
             return equation.acceleration(q, v, total)
         q, v = self._states(q=q, v=v)
@@ -188,7 +194,7 @@ class Plant(NamesNearest, Caching):
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
             raise QueryError(f"held_joints takes one state: q, v and u must have shape ({self.dynamics.n},)")
         equation = self.at(t).equation_of_motion
-        return held_joints(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(q, v, t=t))
+        return held_joints(equation, q, v, equation.on_joints(self.actuation(u, v)) + self.torque(q, v, t=t))
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:

@@ -123,7 +123,7 @@ def plant_state(
     held_joints: tuple[HeldJoint, ...] = ()
     of_tau = tau is not None
     if of_tau:
-        tau = plant.actuation(one_state("tau", tau, robot.joint_names))
+        tau = plant.actuation(one_state("tau", tau, robot.joint_names), v)
         a, held_joints = plant.forward_dynamics(q, v, tau, t=t), plant.held_joints(q, v, tau, t=t)
     else:
         a = one_state("a", a, robot.joint_names)

@@ -23,13 +23,15 @@ from robot_dyn.foundations.validate import instance, number, numbers, truth
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    CoefficientInput = ArrayLike | Mapping[str, float]  # numbers, values by joint name, or "urdf"
+    CoefficientInput = ArrayLike | Mapping[str, ArrayLike]  # numbers, values by joint name, or "urdf"
 
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
 URDF_SOFT = "urdf_soft"  # as the position of a stop: the soft limit in the robot's file
 _KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
+ROWS = (("k",), ("n", "k"))  # a list of numbers for all joints, or one for each joint
 
+Checked = float | np.ndarray | Mapping[str, float] | Mapping[str, np.ndarray] | str
 Owner = TypeVar("Owner")  # an effect, controller or reference
 
 
@@ -114,9 +116,12 @@ class Coefficient:
         """True if the coefficient is one number for all joints, or one number for each joint."""
         return self.shapes == JOINTS
 
-    def checked(
-        self, name: str, values: object, *, error: type[RobotDynError], allow_unresolved: bool
-    ) -> float | np.ndarray | Mapping[str, float] | str:
+    @property
+    def of_rows(self) -> bool:
+        """True if the coefficient is a list for all joints, or one for each joint."""
+        return self.shapes == ROWS
+
+    def checked(self, name: str, values: object, *, error: type[RobotDynError], allow_unresolved: bool) -> Checked:
         """Return the checked numbers, as a frozen copy or as a float.
 
         If `allow_unresolved`, values by joint name and "urdf" are returned unchanged; `on` resolves them for an arm.
@@ -124,10 +129,14 @@ class Coefficient:
         Raises:
             RobotDynError: If the numbers have the wrong shape or sign, or are not finite; its class is `error`.
         """
-        if allow_unresolved and self.of_joints and isinstance(values, Mapping):
+        if allow_unresolved and (self.of_joints or self.of_rows) and isinstance(values, Mapping):
             if not values:
                 raise error(f"{name} names no joint; give values by joint, or one number for all joints")
-            return values
+            if self.of_joints:
+                return values
+            rows = replace(self, shapes=(("k",),))
+            options: dict[str, Any] = {"error": error, "allow_unresolved": False}
+            return {joint: np.asarray(rows.checked(f"{name} of {joint}", x, **options)) for joint, x in values.items()}
         if allow_unresolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
         if allow_unresolved and self.stated in ("lower", "upper") and isinstance(values, str) and values == URDF_SOFT:
@@ -145,7 +154,9 @@ class Coefficient:
         )
         return float(array) if self.shapes == ((),) else array
 
-    def on(self, name: str, values: ArrayLike | Mapping[str, float], dynamics: Jointed) -> ArrayLike:
+    def on(
+        self, name: str, values: ArrayLike | Mapping[str, float], dynamics: Jointed
+    ) -> ArrayLike | Mapping[str, float]:
         """Return the numbers for the joints of an arm; values by joint name or "urdf" become (n,).
 
         Raises:
@@ -155,7 +166,7 @@ class Coefficient:
         if isinstance(values, Mapping):
             for joint in values.keys() - set(names):
                 raise EffectError(f"{name}: no joint {joint!r}; {nearest(str(joint), names)}")
-            return [values.get(joint, self.fill_value) for joint in names]
+            return values if self.of_rows else [values.get(joint, self.fill_value) for joint in names]
         if values is URDF or values is URDF_SOFT:
             return self._stated(name, values, dynamics)
         if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):

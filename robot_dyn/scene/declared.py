@@ -53,7 +53,7 @@ _UNDECLARED = Coefficient(shapes=((), ("k",), ("k", "m")))
 
 def _argument(name: str, value: Any, robot: Robot, form: Coefficient | None) -> Any:
     """Return a number, an array for a list, an array (n,) for a value by joint; texts and truth values unchanged."""
-    if form is None:
+    if form is None or (form.of_rows and isinstance(value, dict)):
         return value
     if form.of_joints or isinstance(value, dict):
         return per_joint(name, value, robot, elsewhere=form.fill_value)

@@ -15,6 +15,7 @@ from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
+from robot_dyn.effects.torque_speed_limit import TorqueSpeedLimit
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.foundations.errors import SceneError
@@ -217,7 +218,11 @@ _LINE = declared_part(
         "other_frame": (str | None, Field(None, description="Another frame of the arm; the world by default.")),
     },
 )  # fmt: skip
-_OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, Wrench, Carried)}
+_MOTOR = declared_part(
+    DeclaredEffect, "torque_speed_limit", TorqueSpeedLimit,
+    others={"at": (Literal["joint", "motor"], Field("joint", description="The place of speeds and torques."))},
+)  # fmt: skip
+_OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, _MOTOR, Wrench, Carried)}
 """Tables that are not built from one class, by kind."""
 
 

@@ -191,7 +191,8 @@ class _TracedConservative(_Torque, Conservative):
 class _TracedBound(_Part, Bound):
     """A traced bound on the actuation."""
 
-    actuation = _method("actuation", lambda u, *_: len(u))
+    actuation, limited = (_method(name, lambda u, *_: len(u)) for name in ("actuation", "limited"))
+    of_velocity = _inner("of_velocity")
 
 
 class _States(_Part, Stateful):

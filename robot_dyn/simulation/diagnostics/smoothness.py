@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from robot_dyn.control.digital_loop.block import Block
+from robot_dyn.effects.effect import Bound
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
 
@@ -153,18 +154,17 @@ def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, n
 def _saturation(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> Kink:
     """Return the first kink that is a continuous control near a level of the actuation."""
     n, m = equation.plant.dynamics.n, equation.state_size
-    least = np.full(n, np.inf)
-    if setup.controller is not None and not equation.sampled:
-        for part in (setup.controller.thresholds(), *(effect.thresholds(n) for effect in setup.plant.effects)):
-            for threshold in part:
-                if threshold.of_actuation:
-                    least[threshold.joint] = min(least[threshold.joint], abs(threshold.level))
-    if not np.isfinite(least).any():
+    if setup.controller is None or equation.sampled:
+        return Kink()
+    parts = [(setup.controller.thresholds(), lambda u, v: u)]
+    parts += [(effect.thresholds(n), effect.limited) for effect in setup.plant.effects if isinstance(effect, Bound)]
+    levels = [(x.joint, abs(x.level), values) for of, values in parts for x in of if x.of_actuation]
+    if not levels:
         return Kink()
     rows = np.unique(np.linspace(0, len(path.t) - 1, _STATES).astype(int))
     u = np.array([equation.command(float(path.t[i]), q[i], v[i], path.y[i, 2 * n : 2 * n + m]) for i in rows])
-    saturates = np.any(np.abs(u[1:]) > _NEAR_LIMIT * least, axis=1)
-    return _first(path.t[rows], saturates, Doubt(DoubtKind.SATURATES))
+    near = [np.abs(values(u, v[rows])[1:, i]) > _NEAR_LIMIT * level for i, level, values in levels]
+    return _first(path.t[rows], np.any(near, axis=0), Doubt(DoubtKind.SATURATES))
 
 
 def _first(t: np.ndarray, happens: np.ndarray, doubt: Doubt) -> Kink:

@@ -161,7 +161,7 @@ class _Rates:
         """Return (a, ż), shape (n + size,)."""
         q, v, z, u = self.parts(x)
         equation = self.equation
-        u, reached = equation.applied(equation.commanded(u), z)
+        u, reached = equation.applied(equation.commanded(u), v, z)
         torques = equation.torques(self.t, q, v, (len(q),), z)
         a = np.asarray(equation.acceleration(q, v, sum(torques, start=equation.on_joints(u))), float)
         rates = np.zeros(len(z))
@@ -177,7 +177,7 @@ class _Rates:
         """
         q, v, z, u = self.parts(x)
         equation, rigid = self.equation, self.equation.dynamics
-        u, _ = equation.applied(equation.commanded(u), z)
+        u, _ = equation.applied(equation.commanded(u), v, z)
         total = np.abs(np.asarray([u, *equation.torques(self.t, q, v, (len(q),), z)], float)).sum(axis=0)
         total += np.abs(np.asarray([rigid.N(q), rigid.coriolis_torque(q, v)], float)).sum(axis=0).max()
         terms = np.abs(slopes) @ np.abs(x)
@@ -294,14 +294,14 @@ def _cause(rates: _Rates, x: np.ndarray) -> str:
     """Return the thresholds of effects that the state lies on, in words."""
     q, v, z, u = rates.parts(x)
     equation, causes = rates.equation, []
-    _, reached = equation.applied(u, z, range(len(equation.effects)))
+    _, reached = equation.applied(u, v, z, range(len(equation.effects)))
     for k, effect in enumerate(equation.effects):
         for threshold in effect.thresholds(len(q)):
             values, i = v if threshold.of_velocity else q, threshold.joint
             if threshold.state is not None:
                 values, i = z[equation.states[k]], threshold.state
             elif threshold.of_actuation and isinstance(effect, Bound):
-                values = reached[k]
+                values = effect.limited(reached[k], v)
             if abs(values[i] - threshold.level) <= max(threshold.slack, _NEAR * max(1.0, abs(threshold.level))):
                 joint = equation.dynamics.joint_names[threshold.joint]
                 causes.append(f"{effect.name} switches at {threshold.name} {threshold.level:.6g} of {joint}")

@@ -33,7 +33,7 @@ def problem(equation: StateEquation, t: float, x: Array, held: Array | None) -> 
     q, v, z, _ = equation.state(y)
     q = q + v * (h / 2)
     z_controller, z_effects = z[: equation.state_size], z[equation.state_size :]
-    u, reached = motion.applied(equation.command(t, q, v, z) if held is None else held, z_effects)
+    u, reached = motion.applied(equation.command(t, q, v, z) if held is None else held, v, z_effects)
     torques = [
         (force, torque)
         for force, torque in zip(motion.forces, motion.torques(t, q, v, z=z_effects), strict=True)

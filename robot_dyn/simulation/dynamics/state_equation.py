@@ -179,7 +179,7 @@ class StateEquation(Caching):
     def actuation(self, t: float, q: Array, v: Array, z: Array, held: Array | None) -> Array:
         """Return the actuation within all bounds of the plant; that of `held`, in zero-order hold, if not None."""
         u = self.command(t, q, v, z) if held is None else held
-        return self.equation_of_motion.applied(u, z[self.state_size :])[0]
+        return self.equation_of_motion.applied(u, v, z[self.state_size :])[0]
 
     def acceleration(self, t: float, q: Array, v: Array, z: Array, u: Array) -> Array:
         """Return the acceleration under an actuation u that is within all bounds, (n,)."""
@@ -214,7 +214,7 @@ class StateEquation(Caching):
         equation, controller, n = self.equation_of_motion, self.controller, self.plant.dynamics.n
         q, v, z, _ = self.state(y)
         z_controller, z_effects = z[: self.state_size], z[self.state_size :]
-        u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, z_effects)
+        u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, v, z_effects)
         torques = equation.torques(t, q, v, z=z_effects)
         total = sum(torques, start=equation.on_joints(u))
         result = np.empty_like(y)
@@ -266,14 +266,18 @@ class StateEquation(Caching):
     def demands(
         self, t: float, q: Array, v: Array, z: Array, held: Array | None, parts: tuple[int, ...]
     ) -> list[Array]:
-        """Return the torque that reaches each of these parts, (n,), which its thresholds limit; see `limited`."""
+        """Return the values of each of these parts, (n,), that its thresholds limit; see `limited`."""
         if not parts or self.controller is None:
             return []
         state, equation = (t, q, v, z[: self.state_size]), self.equation_of_motion
         whole = range(len(equation.effects))
         u, bounds = (call(self.controller.torque, *state), whole) if held is None else (held, None)
-        reached = equation.applied(u, z[self.state_size :], bounds)[1]
-        return [call(self.controller.demand, *state) if k == CONTROLLER else reached[k] for k in parts]
+        reached = equation.applied(u, v, z[self.state_size :], bounds)[1]
+        effects: Any = equation.effects
+        return [
+            call(self.controller.demand, *state) if k == CONTROLLER else call(effects[k].limited, reached[k], v)
+            for k in parts
+        ]
 
     def switching(self, t: float, q: Array, v: Array) -> list[float | np.floating]:
         """Return the values of the user-defined events, in floats or symbols."""

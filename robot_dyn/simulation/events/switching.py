@@ -104,6 +104,8 @@ class Switching:
         for i in np.flatnonzero((distances == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
         first = n * len(self.equation.limited)
+        if first and self.equation.sampled and (held is None or np.isnan(held).any()):  # before the first tick
+            held = self.equation.tick(t, y)[1]
         values = self.equation.event_values(t, y, held)
         distances = values[actuation] - levels[E:]
         # at distance 0 a limit is reached

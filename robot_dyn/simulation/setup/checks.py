@@ -138,7 +138,7 @@ def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:
             if any(threshold.of_actuation for threshold in force.thresholds(dynamics.n)):
                 raise EffectError(f"{force.name}: only bounds may have thresholds of the actuation")
         u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
-        u, reached = equation.applied(u, z)
+        u, reached = equation.applied(u, v0, z)
         names = (type(plant.effects[k]).__name__ for k in equation.states)
         rates = equation.state_rates(0.0, q0, v0, u, reached, z)
         for name, (place, rate) in zip(names, rates, strict=True):

@@ -18,6 +18,7 @@ from robot_dyn.tools.identify.verdict import Verdict as Verdict
 __all__: list[str]
 
 # Names that only tools and tests import.
+from robot_dyn.tools.identify.estimation import Estimate as Estimate
 from robot_dyn.tools.identify.estimation import Model as Model
 from robot_dyn.tools.identify.estimation import estimate as estimate
 from robot_dyn.tools.identify.estimation import model_of as model_of
@@ -30,5 +31,7 @@ from robot_dyn.tools.identify.physical import links_of as links_of
 from robot_dyn.tools.identify.physical import nearest_possible as nearest_possible
 from robot_dyn.tools.identify.physical import pseudo_inertia as pseudo_inertia
 from robot_dyn.tools.identify.regression import Fit as Fit
+from robot_dyn.tools.identify.regression import Rows as Rows
+from robot_dyn.tools.identify.regression import fit as fit
 from robot_dyn.tools.identify.signals import Signals as Signals
 from robot_dyn.tools.identify.signals import low_pass as low_pass

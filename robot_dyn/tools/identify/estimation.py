@@ -148,8 +148,8 @@ def estimate(
 
 
 def _eroded(moving: np.ndarray, signals: Signals) -> np.ndarray:
-    """Return True for times whose neighbours within half a period of the cutoff are True."""
+    """Return True for times whose neighbours within a period of the cutoff are True."""
     from scipy.ndimage import binary_erosion
 
-    half = int(0.5 / (signals.cutoff_hz * signals.step_s * signals.every))
+    half = int(1 / (signals.cutoff_hz * signals.step_s * signals.every))
     return binary_erosion(moving, np.ones((2 * half + 1, 1), bool), border_value=1)

@@ -63,9 +63,9 @@ def identify(
             the largest speed of the joint.
 
     Raises:
-        LogError: If the log lacks torques, a joint does not move, a torque is constant or saturated, columns are
-            swapped, the motion does not determine the parameters, or the log does not follow the arm's equations.
-        PlanError: If positions or times are missing, or angles look like degrees.
+        LogError: If the log lacks positions or torques, a joint does not move, a torque is constant or saturated, two
+            columns are swapped, the motion does not determine the parameters, or the log is of another arm.
+        PlanError: If times are missing, or angles look like degrees.
         MissingExtraError: If cvxpy or clarabel is not installed: pip install 'robot-dyn[identify]'.
 
     Source: Janot, Vandanjon, Gautier, A generic instrumental variable approach for industrial robot identification,

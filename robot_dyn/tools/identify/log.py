@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from robot_dyn import Robot, RobotDynError, Trajectory
 from robot_dyn.control import PiecewisePolynomial, name_of, recorded, refuse_other_units, table_of
-from robot_dyn.foundations import Value, instance, numbers, read_only
+from robot_dyn.foundations import Value, instance, nearest, numbers, read_only
 from robot_dyn.tools.identify.signals import evenly
 
 if TYPE_CHECKING:
@@ -70,16 +70,14 @@ def read_log(
         gains: Drive gains, a number or (n,), in [N m/A], that turn currents into torques.
 
     Raises:
-        LogError: If the torques are missing or constant, a joint does not move, or a torque is saturated.
-        PlanError: If positions or times are missing, or angles look like degrees.
+        LogError: If positions or torques are missing, a torque is constant or saturated, or a joint does not move.
+        PlanError: If times are missing, or angles look like degrees.
     """
     table = table_of(_spread(arm, source), arm.joint_names, {}, None, None)
     columns = {name_of(head): head for head in table.columns}
     times = {head: x for head, x in table.columns.items() if name_of(head) in ("t", "time", "timestamp", "stamp")}
-    q_heads = {
-        joint: next((columns[k] for k in (f"q {joint}", joint) if k in columns), None) for joint in arm.joint_names
-    }
-    q_columns = {_renamed(head, joint): table.columns[head] for joint, head in q_heads.items() if head is not None}
+    q_heads = _heads(arm, columns, ("q {}", "{}"))
+    q_columns = {_renamed(head, joint): table.columns[head] for joint, head in q_heads.items()}
     samples = recorded(arm, times | q_columns)
     refuse_other_units(samples)
     t, q = samples.t, samples.q
@@ -119,15 +117,25 @@ def _renamed(head: str, joint: str) -> str:
     return joint + head[len(name_of(head)) :] if head.startswith(name_of(head)) else joint
 
 
+def _heads(arm: Robot, columns: Mapping[str, str], forms: Sequence[str]) -> dict[str, str]:
+    """Return the heading of a quantity of each joint, in the first form that the table has."""
+    heads = {}
+    for joint in arm.joint_names:
+        wanted = [form.format(joint) for form in forms]
+        head = next((columns[name] for name in wanted if name in columns), None)
+        if head is None:
+            near = nearest(wanted[0], columns)
+            raise LogError(f"there is no column {wanted[0]!r}; {near}; the log needs one for each joint: rename it")
+        heads[joint] = head
+    return heads
+
+
 def _torques(arm: Robot, table: Mapping[str, np.ndarray], columns: Mapping[str, str], gains: Any) -> np.ndarray:
-    kinds = ("current",) if gains is not None else TORQUES
-    heads = {joint: next((columns[f"{kind} {joint}"] for kind in kinds if f"{kind} {joint}" in columns), None)
-             for joint in arm.joint_names}  # fmt: skip
-    if missing := [joint for joint, head in heads.items() if head is None]:
-        if gains is None and all(f"current {joint}" in columns for joint in arm.joint_names):
-            raise LogError("the log has currents, not torques; give the drive gains in N m/A as gains=")
-        raise LogError(f"there is no column '{kinds[0]} {missing[0]}': the log needs one for each joint; add it")
-    tau = np.stack([np.asarray(table[str(head)], float) for head in heads.values()], axis=1)
+    kinds, first = TORQUES if gains is None else ("current",), arm.joint_names[0]
+    if f"current {first}" in columns and not any(f"{kind} {first}" in columns for kind in kinds):
+        raise LogError("the log has currents, not torques; give the drive gains in N m/A as gains=, --gains")
+    heads = _heads(arm, columns, [f"{kind} {{}}" for kind in kinds])
+    tau = np.stack([np.asarray(table[head], float) for head in heads.values()], axis=1)
     if not np.isfinite(tau).all():
         k, i = np.argwhere(~np.isfinite(tau))[0]
         raise LogError(f"{kinds[0]} {arm.joint_names[i]}: sample {k + 1} is {tau[k, i]}; remove the sample")

@@ -5,6 +5,7 @@
 
 Z is the same regressor on a motion that is independent of the noise of the log: least squares are biased, because noise
 of q enters Y and, through the controller, τ. S is the autocovariance of the residuals between all joints.
+Sums of it are corrected for the part of the errors that the fit takes.
 [Young 2011; Janot, Vandanjon, Gautier 2014; Newey, West 1987]
 """
 
@@ -21,6 +22,7 @@ from robot_dyn.foundations import Value
 LAGS = 3  # rows, in the autocovariance
 LEVEL = 0.95
 _LEAST = 1e-12  # [N m]: least standard deviation of residuals
+_LEVERAGE = 0.5  # largest, of a row, by which its residual is enlarged in the robust covariance [MacKinnon, White 1985]
 
 
 @final
@@ -108,41 +110,45 @@ def fit(rows: Rows, passes: int = 3) -> Fit:
     m, n, p = rows.Y.shape
     used = rows.used.astype(float)[..., None]
     Y, Z, tau = rows.Y * used, rows.Z * used, rows.tau * rows.used
-    count = np.maximum(rows.used.sum(axis=0), 1)
-    inflation = np.sqrt(count / np.maximum(count - p / n, 1))
     scale = np.sqrt((Y**2).sum(axis=(0, 1)))
     scale = np.where(scale > 0, scale, 1.0)
     residuals = rows.tau - rows.tau.mean(axis=0)
-    values, scores, A = np.zeros(p), Z, np.eye(p)
+    values, sigma, A = np.zeros(p), np.ones(n), np.eye(p)
     for _ in range(passes):
-        sigma = np.maximum(rms(residuals, rows.used) * inflation, _LEAST)
-        scores = Z / scale / sigma[:, None] ** 2
-        A = scores.reshape(-1, p).T @ (Y / scale).reshape(-1, p)
-        values = np.linalg.solve(A, scores.reshape(-1, p).T @ tau.ravel()) / scale
+        sigma = np.maximum(rms(residuals, rows.used), _LEAST)
+        scores = (Z / scale / sigma[:, None] ** 2).reshape(-1, p)
+        A = scores.T @ (Y / scale).reshape(-1, p)
+        values = np.linalg.solve(A, scores.T @ tau.ravel()) / scale
         residuals = rows.tau - rows.Y @ values
     inverse = np.linalg.inv(A)
-    e = residuals * rows.used * inflation
-    S = _parametric(scores, e, rows.used)
-    blocks = np.einsum("tip,ti->tp", scores, e)
-    B = sum(
-        (1 - abs(k) / (LAGS + 1)) * blocks[max(k, 0) : m + min(k, 0)].T @ blocks[max(-k, 0) : m + min(-k, 0)]
-        for k in range(-LAGS, LAGS + 1)
-    )
+    Y, Z, e = Y / scale / sigma[:, None], Z / scale / sigma[:, None], residuals * rows.used / sigma
+    taken = Y @ inverse  # e = (1 − H) ε with H = taken · Zᵀ
+    leverage = np.clip((taken * Z).sum(axis=2), 0.0, _LEVERAGE)
+    blocks = np.einsum("tip,ti->tp", Z, e / (1 - leverage))
+    B = sum(_taper(k) * blocks[max(k, 0) : m + min(k, 0)].T @ blocks[max(-k, 0) : m + min(-k, 0)]
+            for k in range(-LAGS, LAGS + 1))  # fmt: skip
     unit = np.outer(1 / scale, 1 / scale)
-    dof = float(rows.used.sum() - p)
-    return Fit(
-        rows.names, values, inverse @ S @ inverse.T * unit, inverse @ B @ inverse.T * unit, residuals, rows.used, dof
-    )
+    covariance, robust = (inverse @ X @ inverse.T * unit for X in (_parametric(Z, e, taken, rows.used), B))
+    return Fit(rows.names, values, covariance, robust, residuals, rows.used, float(rows.used.sum() - p))
 
 
-def _parametric(scores: np.ndarray, e: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Return Σ Zᵢᵀ S_ij Z_j with the autocovariance of the residuals, tapered over the lags (Bartlett)."""
-    m, _, p = scores.shape
+def _taper(lag: int) -> float:
+    """Return the weight of a lag (Bartlett)."""
+    return 1 - abs(lag) / (LAGS + 1)
+
+
+def _parametric(Z: np.ndarray, e: np.ndarray, taken: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Return Σ Zᵢᵀ S_ij Z_j with the autocovariance of the errors, tapered over the lags.
+
+    The fit takes part of the errors: of white ones, residuals have the covariance 1 − H. Sums of H over the rows are
+    added to those of the residuals, joint by joint and lag by lag.
+    """
+    m, _, p = Z.shape
     S = np.zeros((p, p))
     for k in range(LAGS + 1):
         a, b = slice(k, m), slice(0, m - k)
         count = used[a].astype(float).T @ used[b].astype(float)
-        c = (1 - k / (LAGS + 1)) * (e[a].T @ e[b]) / np.maximum(count, 1)
-        part = np.einsum("tip,ij,tjr->pr", scores[a], c, scores[b], optimize=True)
+        c = e[a].T @ e[b] + np.tensordot(taken[a], Z[b], ((0, 2), (0, 2)))
+        part = np.einsum("tip,ij,tjr->pr", Z[a], _taper(k) * c / np.maximum(count, 1), Z[b], optimize=True)
         S += part if k == 0 else part + part.T
     return S

@@ -15,6 +15,7 @@ from robot_dyn.effects import EffortLimit, RigidStops
 from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.motors_file import Motors
+from robot_dyn.tools.motors.torque_speed import TorqueSpeed
 
 _SAME_ROTOR = 0.01  # largest relative difference of inertias
 _BEYOND = 1e-9  # [rad] or [m]: rounding by which a position may exceed its limit
@@ -35,12 +36,16 @@ class Limits:
         velocity: |q̇|, in [rad/s] or [m/s].
         acceleration: |q̈|, in [rad/s²] or [m/s²].
         continuous: Root mean square of τ, in [N m] or [N].
+        line: Peak torque of driving motors by speed; None for none.
+        continuous_line: Continuous torque by the mean speed of a motion; None for none.
     """
 
     effort: Any = field(default=inf, metadata=coefficient("N m", minimum=0, infinite=True, fill_value=inf))
     velocity: Any = field(default=inf, metadata=_positive("rad/s"))
     acceleration: Any = field(default=inf, metadata=_positive("rad/s^2"))
     continuous: Any = field(default=inf, metadata=_positive("N m"))
+    line: TorqueSpeed | None = None
+    continuous_line: TorqueSpeed | None = None
 
     def __post_init__(self) -> None:
         check_coefficients(self, PlanError, allow_unresolved=True)
@@ -55,13 +60,31 @@ class Limits:
             by_joint = {name: form.on(name, getattr(self, name), dynamics) for name, form in declared(Limits).items()}
         except EffectError as error:
             raise PlanError(str(error)) from None
-        return Limits(**{name: np.broadcast_to(x, dynamics.n) for name, x in by_joint.items()})
+        return replace(self, **{name: np.broadcast_to(np.asarray(x), dynamics.n) for name, x in by_joint.items()})
 
     def times(self, torque: float, rates: float = 1.0) -> Limits:
         """Return the limits with peak torques times one factor, velocities and accelerations times another."""
         return replace(
-            self, effort=torque * self.effort, velocity=rates * self.velocity, acceleration=rates * self.acceleration
-        )
+            self, effort=torque * self.effort, velocity=rates * self.velocity, acceleration=rates * self.acceleration,
+            line=self.line and self.line.times(torque),
+        )  # fmt: skip
+
+    def bounds(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the smallest and largest torque of the motors at velocities v, (..., n) each."""
+        effort = np.broadcast_to(self.effort, np.shape(v))
+        driving = effort if self.line is None else np.minimum(effort, self.line.at(v))
+        return -np.where(v <= 0, driving, effort), np.where(v >= 0, driving, effort)
+
+    def used(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the fraction of the peak torques, and of lines where motors drive, that τ at v uses, (..., n)."""
+        used = used_fraction(np.abs(tau), self.effort)
+        return used if self.line is None else np.maximum(used, np.where(tau * v >= 0, self.line.used(tau, v), 0.0))
+
+    def at_mean_speed(self, speed: np.ndarray) -> Limits:
+        """Return the limits with the continuous torque at mean speeds |v| of a motion, (n,)."""
+        if self.continuous_line is None:
+            return self
+        return replace(self, continuous=np.minimum(self.continuous, self.continuous_line.at(speed)))
 
 
 def limits_of(
@@ -83,6 +106,12 @@ def limits_of(
     velocity = _stated(robot, "velocity") if velocity is None else velocity
     acceleration, continuous = (inf if x is None else x for x in (acceleration, continuous))
     limits = Limits(effort, velocity, acceleration, continuous).on(robot)
+    if motors is not None:
+        limits = replace(
+            limits,
+            line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
+            continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),
+        )
     saturates = [np.broadcast_to(effect.limit, robot.n) for effect in plant.effects if isinstance(effect, EffortLimit)]
     return replace(limits, effort=np.minimum.reduce([limits.effort, *saturates]))
 

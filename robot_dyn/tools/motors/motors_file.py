@@ -4,7 +4,8 @@
     shoulder_pan_joint, 150, 56, 3.15, 101, 1.2e-4, joint
 
 Torques and speeds are at the joint, or at the motor shaft if the column `at` is "motor": the gear ratio then multiplies
-the torque and divides the speed. A rotor adds the inertia ratio² · rotor_inertia at the joint.
+the torque and divides the speed. A rotor adds the inertia ratio² · rotor_inertia at the joint. A joint with several
+lines has a motor whose torques fall with speed: each line is a corner of its torque–speed line, see `Motors.line`.
 [Siciliano et al. 2009, sec. 5.2]
 """
 
@@ -17,7 +18,11 @@ from math import inf, pi
 from pathlib import Path
 from typing import Any, final
 
+import numpy as np
+
+from robot_dyn.effects import AT, TorqueSpeedLimit, check_line, check_speed
 from robot_dyn.foundations import PlanError, csv_rows, nearest, shorten
+from robot_dyn.tools.motors.torque_speed import Points
 
 _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")
@@ -34,6 +39,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "gear_ratio": {"": 1.0},
     "rotor_inertia": _INERTIA,
 }
+_OF_CORNERS = "speed", "peak", "continuous"  # may be 0 at a corner
 
 
 @final
@@ -41,12 +47,17 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
 class Motors:
     """Motors by joint, with values at the joint; joints without a value have no limit, or no rotor inertia.
 
+    A line has the corners (speed, torque) of a polyline, in [rad/s] and [N m], or [m/s] and [N]. A motor that drives
+    (τ v > 0) gives up to its line, one that brakes its peak torque; the last speed is its largest one.
+
     Attributes:
         peak: Peak torque, in [N m] or [N].
         continuous: Continuous torque, in [N m] or [N].
         speed: Largest speed, in [rad/s] or [m/s].
         armature: Inertia of the rotor at the joint, in [kg m²] or [kg].
         source: Path of the file.
+        line: Peak torque by speed.
+        continuous_line: Continuous torque by mean speed.
     """
 
     peak: Mapping[str, float]
@@ -54,6 +65,26 @@ class Motors:
     speed: Mapping[str, float]
     armature: Mapping[str, float]
     source: str = field(default="motors")
+    line: Mapping[str, Points] = field(default_factory=dict)
+    continuous_line: Mapping[str, Points] = field(default_factory=dict)
+
+    @property
+    def limit(self) -> TorqueSpeedLimit:
+        """The effect that limits the actuation of a plant to the lines.
+
+        Raises:
+            PlanError: If there is no line, or one does not end with a torque of 0, at the no-load speed.
+        """
+        if not self.line:
+            raise PlanError(f"{self.source}: no joint has a torque–speed line; use an EffortLimit with motors.peak")
+        for joint, points in self.line.items():
+            if points[-1][1]:
+                raise PlanError(
+                    f"{self.source}: the line of {joint!r} ends with {points[-1][1]:g} N m, but a run may exceed this"
+                    " speed: add the no-load speed, with a peak of 0"
+                )
+        speed, torque = ({joint: [p[k] for p in points] for joint, points in self.line.items()} for k in (0, 1))
+        return TorqueSpeedLimit(speed, torque)
 
 
 def read_motors(path: str | Path) -> Motors:
@@ -63,20 +94,25 @@ def read_motors(path: str | Path) -> Motors:
     `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and [m/s]; speeds may be in
     [rpm] or [deg/s]. `at` is "joint" or "motor", the place of torques and speeds; it is required with gear ratios.
 
+    Several lines of one joint are the corners of its torque–speed line, with increasing speeds and peaks that do not
+    increase; those with a continuous torque are the corners of a second line. The first states at, gear and rotor.
+
     Raises:
-        PlanError: If the file cannot be read, a column or unit is unknown, or an entry is not a positive number.
+        PlanError: If the file cannot be read, a column or unit is unknown, an entry is not a positive number, corners
+            are not a torque–speed line, or a speed above 100 rad/s is at the joint.
     """
     lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …", skip_blank=True)
     heads = _heads(path, next(lines)[1])
-    rows = [_row(where, heads, line) for where, line in lines]
-    if not rows:
+    corners: dict[str, list[dict[str, Any]]] = {}
+    for where, line in lines:
+        row = _row(where, heads, line)
+        corners.setdefault(row["joint"], []).append(row)
+    if not corners:
         raise PlanError(f"{path}: contains no motors; add a line for each joint")
-    names = [row["joint"] for row in rows]
-    if twice := next((name for k, name in enumerate(names) if name in names[:k]), None):
-        raise PlanError(f"{path}: joint {shorten(twice)!r} appears twice; keep one line")
+    rows = [_motor(joint) for joint in corners.values()]
     columns = {
         key: {row["joint"]: row[key] for row in rows if row.get(key)}
-        for key in ("peak", "continuous", "speed", "armature")
+        for key in ("peak", "continuous", "speed", "armature", "line", "continuous_line")
     }
     return Motors(**columns, source=str(path))
 
@@ -101,30 +137,55 @@ def _heads(path: str | Path, heads: Sequence[str]) -> dict[str, float]:
 
 
 def _row(where: str, factors: Mapping[str, float], line: Sequence[str]) -> dict[str, Any]:
-    """Return torques and speed at the joint, and the inertia of the rotor there."""
+    """Return the entries of a line in SI units, with its place in the file."""
     texts = {name: text.strip() for name, text in zip(factors, line, strict=True)}
-    row: dict[str, Any] = {"joint": texts.pop("joint")}
-    at = texts.pop("at", "") or "joint"
-    if at not in ("joint", "motor"):
+    row: dict[str, Any] = {"joint": texts.pop("joint"), "where": where, "at": texts.pop("at", "")}
+    return row | {name: factors[name] * _number(f"{where}: {name}", text) for name, text in texts.items() if text}
+
+
+def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return torques, speed and lines at the joint, and the inertia of the rotor there, of the lines of a joint."""
+    first, where, joint = rows[0], rows[0]["where"], rows[0]["joint"]
+    at, ratio = first["at"] or AT[0], first.get("gear_ratio", 1.0)
+    for row in rows[1:]:
+        if other := next(
+            (x for x in ("at", "gear_ratio", "rotor_inertia") if row.get(x, "") not in ("", first.get(x))), ""
+        ):
+            raise PlanError(f"{row['where']}: {joint!r} has another {other} in its first line; keep that one")
+    if at not in AT:
         raise PlanError(f"{where}: at must be joint or motor, got {shorten(at)!r}")
-    for name, text in texts.items():
-        if text:
-            row[name] = factors[name] * _positive(f"{where}: {name}", text)
-    if "gear_ratio" not in row and (at == "motor" or "rotor_inertia" in row):
+    if "gear_ratio" not in first and (at == "motor" or "rotor_inertia" in first):
         subject = "values at the motor need" if at == "motor" else "a rotor_inertia needs"
         raise PlanError(f"{where}: {subject} a gear_ratio; give 1 without a gear")
-    ratio = row.get("gear_ratio", 1.0)
-    for name, power in (("peak", 1), ("continuous", 1), ("speed", -1)):
-        if at == "motor" and name in row:
-            row[name] *= ratio**power
-    return row | {"armature": ratio**2 * row.get("rotor_inertia", 0.0)}
+    for row in rows:
+        for name in (x for x in _UNITS if row.get(x) == 0 and (len(rows) == 1 or x not in _OF_CORNERS)):
+            raise PlanError(f"{row['where']}: {name} must be a positive number, got 0")
+        if len(rows) > 1 and "speed" not in row:
+            raise PlanError(
+                f"{row['where']}: joint {shorten(joint)!r} appears twice; keep one line, or give a speed in each: they"
+                " are the corners of its torque–speed line"
+            )
+        if at == "joint" and "speed" in row:
+            check_speed(f"{row['where']}: speed", row["speed"], PlanError)
+    N = ratio if at == "motor" else 1.0
+    motor = {name: N * first[name] for name in ("peak", "continuous") if name in first}
+    motor |= {"joint": joint, "armature": ratio**2 * first.get("rotor_inertia", 0.0)}
+    if "speed" in first:
+        motor["speed"] = rows[-1]["speed"] / N
+    for name, line in (("peak", "line"), ("continuous", "continuous_line")):
+        corners = [(row["speed"] / N, N * row[name]) for row in rows if len(rows) > 1 and name in row]
+        if corners:
+            speed, torque = np.transpose(corners)
+            check_line(f"{where}: {name} of {joint}", speed, torque, PlanError)
+            motor |= {line: tuple(corners), name: corners[0][1]}
+    return motor
 
 
-def _positive(name: str, text: str) -> float:
+def _number(name: str, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0 < value < inf:
+    if not 0 <= value < inf:
         raise PlanError(f"{name} must be a positive number, got {shorten(text)!r}")
     return value

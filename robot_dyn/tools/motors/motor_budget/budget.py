@@ -39,7 +39,9 @@ def budget(
         τ = M(q) a + C(q, v) v + ∂V/∂q − Σ τ_effect
 
     For a plan, τ is computed by inverse dynamics; for a run, it is the recorded actuation. |τ| is compared with the
-    peak torque, its root mean square over the motion with the continuous torque. Powers are τ v at the joint, without
+    peak torque, its root mean square over the motion with the continuous torque. If motors have torque–speed lines, |τ|
+    at |v| is compared with the line where they drive (τ v > 0), and the continuous torque is the one at the mean of
+    |v|. Powers are τ v at the joint, without
     losses of motor and gear. A rotor inertia in `motors` acts as armature if the arm has none. A run that simulates
     gears has its own rotors; those in `motors` must agree to 1 %.
 
@@ -117,7 +119,8 @@ def _of_plan(
             f"the motion has {reference.n} joints{'' if plan is None else ', ' + ', '.join(joints)}; {robot.name} has"
             f" {robot.n}, {', '.join(robot.joint_names)}; use a motion of this arm"
         )
-    limits, demand = limits_of(plant, motors, **given), of_motion(reference, plant)
+    limits = limits_of(plant, motors, **given)
+    demand = of_motion(reference, plant, limits)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
     findings = [*robot.announced_findings, *(() if plan is None else plan.findings), *outside]
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):

@@ -17,6 +17,7 @@ from robot_dyn.control import PiecewisePolynomial, extreme_values
 from robot_dyn.effects import Causes, Stateful, exerted_torques, torques_by_cause
 from robot_dyn.foundations import EffectError, QueryError
 from robot_dyn.simulation import Ending
+from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.breakaway import NO_BREAKAWAY, Breakaway, breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
@@ -61,6 +62,11 @@ class Demand:
         """P = τ v of each joint, (k, n), in [W]."""
         return self.split.tau * self.v
 
+    @cached_property
+    def mean_speed(self) -> np.ndarray:
+        """Mean of |v| over time, (n,), in [rad/s] or [m/s]."""
+        return self.mean(np.abs(self.v))
+
     @property
     def duration_s(self) -> float:
         """Duration of the motion, in [s]."""
@@ -81,8 +87,8 @@ class Demand:
         return float(max(off))
 
 
-def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
-    """Compute the demand along a plan.
+def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None = None) -> Demand:
+    """Compute the demand along a plan, with times near the largest used fraction of the torque–speed lines of limits.
 
     Raises:
         EffectError: If an effect has states, which a motion does not determine.
@@ -97,7 +103,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
     count = len(grid.piece)
     cell, x = np.repeat(np.arange(count), len(X)), np.tile(X, count)
     tau, v = torques(grid, plant, cell, x)
-    closer = _closer(grid, plant, tau, v)
+    closer = _closer(grid, plant, tau, v, None if limits is None or limits.line is None else limits)
     cell, x = np.concatenate([cell, closer[0]]), np.concatenate([x, closer[1]])
     rules = [
         np.concatenate([np.outer(grid.length / 2, rule).ravel(), np.zeros(len(closer[0]))]) for rule in (KRONROD, GAUSS)
@@ -143,9 +149,16 @@ def root_mean_squares(motion: PiecewisePolynomial, plant: Plant) -> np.ndarray:
     return np.sqrt(weights @ tau**2 / weights.sum())
 
 
-def _closer(cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return cells and places of the largest |τ| and |τ v| of each joint, refined from the points of the rule."""
-    y = np.abs(np.concatenate([tau, tau * v], axis=1)).reshape(len(cells.piece), len(X), -1)
+def _closer(
+    cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray, limits: Limits | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return cells and places of the largest |τ|, |τ v| and used fraction of limits of each joint, refined."""
+
+    def sizes(tau: np.ndarray, v: np.ndarray) -> np.ndarray:
+        used = () if limits is None else (limits.used(tau, v),)
+        return np.concatenate([np.abs(tau), np.abs(tau * v), *used], axis=1)
+
+    y = sizes(tau, v).reshape(len(cells.piece), len(X), -1)
     padded = np.pad(y, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
     highest = np.where((y >= padded[:, :-2]) & (y >= padded[:, 2:]), y, -np.inf).reshape(-1, y.shape[-1])
     rows = np.argsort(-highest, axis=0, kind="stable")[:_PEAKS]
@@ -156,7 +169,7 @@ def _closer(cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray) -> tuple
     for _ in range(_ROUNDS):
         x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _POINTS)
         torque, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel())
-        all_of = np.abs(np.concatenate([torque, torque * speed], axis=1)).reshape(len(cell), _POINTS, -1)
+        all_of = sizes(torque, speed).reshape(len(cell), _POINTS, -1)
         k = all_of[np.arange(len(cell)), :, column].argmax(axis=1)
         row = np.arange(len(cell))
         best, low, high = x[row, k], x[row, np.maximum(k - 1, 0)], x[row, np.minimum(k + 1, _POINTS - 1)]

@@ -21,7 +21,7 @@ _WIDE, _ROW, _CELL, _AROUND = 13.0, 0.42, 2.3, 1.9  # [inch]
 _ACROSS, _MOST = 3, 64  # joints in a row; joints of a figure
 _LETTERS = 24  # in the name of a joint next to its bars
 _BAR = 0.27
-_SHADES = {"peak": 1.0, "continuous": 0.72, "speed": 0.46}  # shades of ink for bars; colours mark causes
+_SHADES = {"peak": 1.0, "continuous": 0.72, "speed": 0.46, "line": 0.3}  # shades of ink for bars; colours mark causes
 
 
 def draw(result: MotorBudget, theme: str = "light") -> Figure:
@@ -57,8 +57,8 @@ def _used(axes: Any, result: MotorBudget, colours: Colours) -> None:
             if not share:
                 continue
             most = max(most, 100 * share)
-            y = place + (k - 1) * _BAR
-            axes.barh(y, 100 * share, 0.9 * _BAR, color=colours["ink"], alpha=_SHADES[kind])
+            y = place + (k - (len(joint.shares) - 1) / 2) * _BAR * 3 / max(3, len(joint.shares))
+            axes.barh(y, 100 * share, 2.7 * _BAR / max(3, len(joint.shares)), color=colours["ink"], alpha=_SHADES[kind])
             axes.text(100 * share, y, f" {100 * share:.3g}", va="center", fontsize=6.5, **ink(colours))
     axes.axvline(100, color=colours["ink"], linewidth=1.0, linestyle="--")
     axes.set_xlim(0, 1.08 * most)
@@ -125,7 +125,7 @@ def _handles(result: MotorBudget, colours: Colours) -> list[Any]:
     joints = result.joints
     acting = [name for name, torque in result.demand.split.torques.items() if torque.any()]
     causes = [(k, name) for k, name in enumerate(joints[0].of_rms) if name in acting]
-    kinds = [kind for kind in _SHADES if any(joint.shares[kind] for joint in joints)]
+    kinds = [kind for kind in _SHADES if any(joint.shares.get(kind) for joint in joints)]
     dashed = [key("± peak torque, where it is near", colours["ink"], linestyle="--", linewidth=0.9)]
     return [
         key("τ, and its peak", colours["ink"], marker="o", markersize=4),

@@ -26,6 +26,7 @@ from robot_dyn.tools.motors.motor_budget.pace import Pace, at_pace, least_pace
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, through
 from robot_dyn.tools.motors.planning.path_at_limits import path
+from robot_dyn.tools.motors.planning.plannable import no_lines
 
 _RESTS = 1e-3  # relative to the largest velocity of a joint: anything slower is a stop
 _TIMES, _PLACES = 4000, 80  # number of sample times of a motion, and of points on the path between two stops
@@ -100,6 +101,7 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
         MissingExtraError: If toppra is not installed.
     """
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
+    no_lines(limits)
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, fraction)
     bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": limits.continuous}
     before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, limits.continuous)

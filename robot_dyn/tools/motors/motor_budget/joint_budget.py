@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isnan, nan
 from operator import itemgetter
 from typing import final
@@ -17,7 +17,9 @@ from robot_dyn.tools.motors.motor_budget.demand import Demand
 
 TOLERANCE = 1e-3  # relative to a limit, by which plans at their limits may exceed it
 _DIGITS = 12  # decimals of times in [s]: places at the ends of cells lie slightly inside
-KINDS: Mapping[str, str] = {"peak": "peak torque", "continuous": "continuous torque", "speed": "speed"}
+KINDS: Mapping[str, str] = {
+    "peak": "peak torque", "continuous": "continuous torque", "speed": "speed", "line": "torque–speed line"
+}  # fmt: skip
 
 
 @final
@@ -40,6 +42,8 @@ class JointBudget:
         peak_limit, continuous_limit, speed_limit: The limits; inf for none, a peak limit of 0 for a passive joint.
         of_peak: Parts of τ at `peak_at_s` by cause.
         of_rms: Parts of `rms` by cause, 1/(T rms) ∫ τ_cause τ dt; negative for a cause that relieves the motor.
+        line: Largest use of the torque–speed line: "torque" in [N m], "speed" in [rad/s], "limit" at that speed,
+            "used", the fraction, and "at_s" in [s]; empty without a line.
         cut: True if an effort limit cut the actuation of a run, so that the demand was higher.
     """
 
@@ -63,15 +67,17 @@ class JointBudget:
     speed_limit: float
     of_peak: dict[str, float]
     of_rms: dict[str, float]
+    line: dict[str, float] = field(default_factory=dict)
     cut: bool = False
 
     @property
     def shares(self) -> dict[str, float]:
-        """Used fractions of the limits "peak", "continuous" and "speed"; 0 for unknown limits."""
+        """Used fractions of the limits "peak", "continuous" and "speed", and of a "line"; 0 for unknown limits."""
         peak = max(self.peak, 0.0 if isnan(self.breakaway) else self.breakaway)
         demand = np.array([peak, self.rms, self.speed])
         limit = np.array([self.peak_limit, self.continuous_limit, self.speed_limit])
-        return dict(zip(KINDS, used_fraction(demand, limit).tolist(), strict=True))
+        used = dict(zip(KINDS, used_fraction(demand, limit).tolist(), strict=False))
+        return used | ({"line": self.line["used"]} if self.line else {})
 
     @reported
     def headroom(self) -> dict[str, float]:
@@ -94,6 +100,10 @@ class JointBudget:
             return f"{self.rms:.4g} {unit} rms (limit {self.continuous_limit:.4g}){_most(self.of_rms)}"
         if kind == "speed":
             return f"{self.speed:.4g} {unit} (limit {self.speed_limit:.4g}) at {self.speed_at_s:.4g} s"
+        if kind == "line":
+            speed = f"{self.line['speed']:.4g} {of_joint('rad/s', self.type)}"
+            needs = f"{self.line['torque']:.4g} {unit} at {speed}"
+            return f"{needs} (limit {self.line['limit']:.4g} there) at {self.line['at_s']:.4g} s"
         starts = self.breakaway > self.peak
         need, at = (self.breakaway, self.breakaway_at_s) if starts else (self.peak, self.peak_at_s)
         more = " to break away" if starts else ", where it was cut" if self.cut else ""
@@ -103,6 +113,8 @@ class JointBudget:
 def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozenset()) -> Iterator[JointBudget]:
     """Yield the budget of each joint; `cut` names joints whose actuation was cut at an effort limit."""
     split, power, row = demand.split, demand.power, np.arange(len(demand.peak))
+    limits = limits.at_mean_speed(demand.mean_speed)
+    lines = list(_lines(demand, limits))
     rms = np.sqrt(demand.mean(split.tau**2))
     delivered, regenerated = (demand.duration_s * demand.mean(x.clip(0.0)) for x in (power, -power))
     at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
@@ -135,8 +147,24 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
             **{key: round(x, _DIGITS) if key.endswith("_at_s") else x for key, x in numbers.items()},
             of_peak={cause: float(torque[at_peak[i], i]) for cause, torque in split.torques.items()},
             of_rms={cause: float(part[i] / rms[i]) if rms[i] else 0.0 for cause, part in parts.items()},
+            line=lines[i],
             cut=name in cut,
         )
+
+
+def _lines(demand: Demand, limits: Limits) -> Iterator[dict[str, float]]:
+    """Yield the demand of each joint that uses the largest fraction of its torque–speed line; {} without a line."""
+    tau, v, line = demand.split.tau, demand.v, limits.line
+    if line is None:
+        yield from [{}] * tau.shape[1]
+        return
+    used, given = limits.used(tau, v), limits.bounds(v)
+    for i, k in enumerate(used.argmax(axis=0)):
+        values = {
+            "torque": abs(tau[k, i]), "speed": abs(v[k, i]), "limit": abs(given[int(tau[k, i] > 0)][k, i]),
+            "used": used[k, i], "at_s": round(float(demand.split.t[k]), _DIGITS),
+        }  # fmt: skip
+        yield {key: float(x) for key, x in values.items()} if line.exists[i] else {}
 
 
 def _most(parts: Mapping[str, float]) -> str:

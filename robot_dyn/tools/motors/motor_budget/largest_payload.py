@@ -107,7 +107,8 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     """
     plant, motion, limits = case_of(motor_budget, "the largest payload")
     robot: Any = plant.dynamics
-    unit, bare = Payload(link, 1.0, com), of_motion(motion, plant)
+    unit, bare = Payload(link, 1.0, com), of_motion(motion, plant, limits)
+    limits = limits.at_mean_speed(bare.mean_speed)
     carried = float(sum(payload.mass for payload in robot.edits.payloads))
 
     def carrying(mass: float) -> Plant:
@@ -131,7 +132,7 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
             return result(inf, least, none, 0.0)
         if most < least:
             return result(None, 0.0, high if most < 0 else low, inf)
-        there = of_motion(motion, carrying(most))
+        there = of_motion(motion, carrying(most), limits)
         share = _share(there, limits)
         if share <= 1 + _CLOSE or turn == _ROUNDS:
             return result(most, least, high, share, there)
@@ -156,24 +157,26 @@ def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: 
         )
     m, n = bare.shape
     joints, t = np.tile(np.arange(n), m), np.repeat(there.split.t, n)
-    yield from _of_torques("peak torque", joints, t, bare.ravel(), per_mass.ravel(), limits)
+    bounds = tuple(x.ravel() for x in limits.bounds(there.v))
+    yield from _of_torques("peak torque", joints, t, bare.ravel(), per_mass.ravel(), bounds)
 
 
 def _of_starts(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
     """Yield the bounds of the torque at which joints break away."""
     assert bare.cells is not None
     joints, t, tau = bare.starts
-    yield from _of_torques("break-away torque", joints, t, tau, breakaway(bare.cells, loaded).torque - tau, limits)
+    bounds = -limits.effort[joints], limits.effort[joints]
+    yield from _of_torques("break-away torque", joints, t, tau, breakaway(bare.cells, loaded).torque - tau, bounds)
 
 
 def _of_torques(
-    name: str, joints: np.ndarray, t: np.ndarray, tau: np.ndarray, slope: np.ndarray, limits: Limits
+    name: str, joints: np.ndarray, t: np.ndarray, tau: np.ndarray, slope: np.ndarray, bounds: tuple[np.ndarray, ...]
 ) -> Iterator[_Bound]:
-    """Yield, for each joint, the narrowest bounds of |τ + m slope| ≤ limit; all arrays are (k,)."""
+    """Yield, for each joint, the narrowest bounds of lower ≤ τ + m slope ≤ upper; all arrays are (k,)."""
     flat = np.abs(slope) <= _NONE * np.abs(slope).max(initial=0.0)
-    limit, steep = limits.effort[joints], np.where(flat, 1.0, slope)
-    none = np.where(np.abs(tau) > limit, inf, -inf)
-    ends = (-limit - tau) / steep, (limit - tau) / steep
+    (lower, upper), steep = bounds, np.where(flat, 1.0, slope)
+    none = np.where((tau < lower) | (tau > upper), inf, -inf)
+    ends = (lower - tau) / steep, (upper - tau) / steep
     least, most = np.where(flat, none, np.minimum(*ends)), np.where(flat, -none, np.maximum(*ends))
     for i in np.unique(joints):
         of_joint = np.flatnonzero(joints == i)
@@ -202,5 +205,5 @@ def _share(demand: Demand, limits: Limits) -> float:
     """Return the largest share of a torque limit."""
     rms = np.sqrt(demand.mean(demand.split.tau**2))
     broken = used_fraction(np.abs(demand.starts.torque), limits.effort[demand.starts.joint])
-    peak = used_fraction(demand.peak, limits.effort)
+    peak = np.maximum(used_fraction(demand.peak, limits.effort), limits.used(demand.split.tau, demand.v).max(axis=0))
     return float(max(peak.max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))

@@ -118,6 +118,18 @@ class MotorBudget(Result):
         }
         yield _table(speed)
         yield ""
+        if lines := [(x, x.line) for x in joints if x.line]:
+            yield "torque–speed line, at the largest used fraction:"
+            yield _table(
+                {
+                    "joint": [x.joint for x, _ in lines],
+                    "unit": [of_joint("N m", x.type) for x, _ in lines],
+                    **{key: [line[key] for _, line in lines] for key in ("torque", "speed", "limit")},
+                    "used": [f"{line['used']:.1%}" for _, line in lines],
+                    "at t [s]": [line["at_s"] for _, line in lines],
+                }
+            )
+            yield ""
         yield "torque by cause at the peak:"
         yield _table(torque | at_peak | _by_cause("torque", [x.of_peak for x in joints]))
         yield ""

@@ -23,7 +23,7 @@ from robot_dyn.tools.motors.planning.path_plan import (
     limit_use,
     phases,
 )
-from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, why_not
+from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, no_lines, why_not
 from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, fastest, imposed
 
 _CELLS, _MOST_CELLS = 200, 8000  # number of cells of the grid, in addition to breaks of the path
@@ -82,6 +82,7 @@ def path(
         raise PlanError(f"fraction must be at most 1, got {fraction:g}")
     check_motors(motors)
     limits = limits_of(plant, motors, effort, velocity, acceleration).times(fraction)
+    no_lines(limits)
     geometry = geometric_path(points, plant.dynamics.joint_names)
     check_effects(plant)
     check_positions(plant, geometry)

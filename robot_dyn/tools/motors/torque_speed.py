@@ -1,0 +1,69 @@
+"""Torque–speed lines of motors: the torque they give at a speed, and the fraction of a line that a demand uses.
+
+A demand of torque and speed (τ, v) uses the fraction λ of a line τ = ℓ(|v|) if (τ, v)/λ lies on it: |τ|/λ = ℓ(|v|/λ).
+Unlike |τ|/ℓ(|v|), it is defined at the no-load speed, where ℓ = 0; where ℓ is constant, both are equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import final
+
+import numpy as np
+
+Points = tuple[tuple[float, float], ...]
+"""Corners (speed, torque) of a line: the torque is constant below the first speed and above the last one."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TorqueSpeed:
+    """The lines of n joints, with corners padded to the same number k by repeating the last one.
+
+    Attributes:
+        speed: Speeds of the corners, (n, k), in [rad/s] or [m/s].
+        torque: Torques there, (n, k), in [N m] or [N]; inf for a joint without a line.
+    """
+
+    speed: np.ndarray
+    torque: np.ndarray
+
+    @classmethod
+    def of_joints(cls, lines: Mapping[str, Points], joint_names: Sequence[str]) -> TorqueSpeed | None:
+        """Return the lines of joints by name; None if no joint has one."""
+        rows = [lines.get(name, ((0.0, inf),)) for name in joint_names]
+        if not any(name in lines for name in joint_names):
+            return None
+        size = max(map(len, rows))
+        table = np.array([[*row, *[row[-1]] * (size - len(row))] for row in rows])
+        return cls(table[..., 0], table[..., 1])
+
+    @property
+    def exists(self) -> np.ndarray:
+        """True for joints with a line, (n,)."""
+        return np.isfinite(self.torque[:, 0])
+
+    def times(self, factor: float) -> TorqueSpeed:
+        """Return the lines with other torques."""
+        return replace(self, torque=factor * self.torque)
+
+    def at(self, v: np.ndarray) -> np.ndarray:
+        """Return ℓ(|v|), (..., n)."""
+        columns = zip(np.moveaxis(np.abs(v), -1, 0), self.speed, self.torque, strict=True)
+        return np.stack([np.interp(*column) for column in columns], axis=-1)
+
+    def used(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the fraction λ of the lines that |τ| at the speed |v| uses, (..., n); 0 without a line."""
+        tau, v, x, y = np.abs(tau), np.abs(v), self.speed, np.where(self.exists[:, None], self.torque, 1.0)
+        step = np.diff(x)
+        slope = np.divide(np.diff(y), step, out=np.zeros_like(step), where=step > 0)
+        slope = np.pad(slope, ((0, 0), (1, 1)))  # of the pieces before, between and after the corners
+        start = np.concatenate([y[:, :1], y], axis=1) - slope * np.concatenate([x[:, :1], x], axis=1)
+        piece = (y * v[..., None] > tau[..., None] * x).sum(axis=-1)  # the number of corners above the ray to (τ, v)
+        rows = np.arange(len(x))
+        slope, start = slope[rows, piece], start[rows, piece]
+        # beyond the last corner, at torque 0, the ray runs along the axis of speeds
+        level = np.divide(tau - slope * v, start, out=np.full_like(tau, inf), where=start > 0)
+        return np.where(self.exists, np.where((tau == 0) & (start <= 0), v / np.maximum(x[:, -1], 1e-300), level), 0.0)
