@@ -323,7 +323,7 @@ def examples(folder: Path) -> dict[str, Example]:
             v1=0.0, start_s=0.1),
         call(rd.control.quintic, q0=q, q1=v, duration_s=1.0, start_s=0.1, v0=0.1, v1=u, a0=u, a1=0.0),
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
-        call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
+        call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True, names=["swing"]),
         call(rd.rollouts, system=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
         call(rd.tools.step.Stepper, plant=plant, n=2, period_s=0.02, controller=sampled, step_s=2e-3, method="RK4",
