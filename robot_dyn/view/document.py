@@ -199,9 +199,9 @@ class _Document:
 
 def _checked_names(names: object, count: int) -> tuple[str, ...]:
     """Return the names of runs; raise a QueryError if they are not distinct texts, one for each run."""
-    if isinstance(names, list | tuple) and all(isinstance(name, str) and name.strip() for name in names):
-        if len(names) == count == len({*names}):
-            return tuple(names)
+    are_texts = isinstance(names, list | tuple) and all(isinstance(name, str) and name.strip() for name in names)
+    if are_texts and len(names) == count == len({*names}):
+        return tuple(names)
     raise QueryError(f"names must be {count} different texts, one for each run, got {shown(names)}")
 
 
