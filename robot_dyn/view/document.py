@@ -199,9 +199,10 @@ class _Document:
 
 def _checked_names(names: object, count: int) -> tuple[str, ...]:
     """Return the names of runs; raise a QueryError if they are not distinct texts, one for each run."""
-    are_texts = isinstance(names, list | tuple) and all(isinstance(name, str) and name.strip() for name in names)
-    if are_texts and len(names) == count == len({*names}):
-        return tuple(names)
+    if isinstance(names, list | tuple):
+        texts = tuple(dict.fromkeys(name for name in names if isinstance(name, str) and name.strip()))
+        if len(texts) == len(names) == count:
+            return texts
     raise QueryError(f"names must be {count} different texts, one for each run, got {shown(names)}")
 
 
