@@ -32,9 +32,9 @@ from robot_dyn.tools.doctor.coordinate_map import Basis, JointMap, Laid, Obstacl
 from robot_dyn.tools.doctor.largest_difference import LargestDifference, MappedPair, largest_differences, mapped_pair
 
 _DIFFERENT = 1e-5  # of the size of a value: rounded angles such as 1.5708 cause smaller differences
-_LISTED = 4  # bodies whose share is printed
+_LISTED = 4  # bodies, and joints without counterpart, that are printed
 _REMEDIES = {
-    Obstacle.MISSING: "name its counterpart with joints=, or lock it with robot.with_(lock={name: 0.0})",
+    Obstacle.MISSING: "name the counterpart (joints=, --joint A=B), or lock it (with_(lock=…), --lock NAME=0)",
     Obstacle.TYPE: "correct the type in one file, or name another counterpart with joints=",
     Obstacle.CARRIER: "name counterparts with joints=, or lock the joints in between",
     Obstacle.COUPLED: "lock it in both, or correct its <mimic>",
@@ -105,9 +105,8 @@ class RobotDifference(Answer):
         """The result in one sentence."""
         a, b = self.names
         if self.unmapped:
-            listed = "; ".join(_obstacle(x, self.names) for x in self.unmapped[:3])
-            more = f"; and {len(self.unmapped) - 3} more joints" if len(self.unmapped) > 3 else ""
-            return f"{a} and {b}: no torques are compared: {listed}{more}"
+            groups = dict.fromkeys((x.file, x.obstacle) for x in self.unmapped)
+            return f"no torques of {a} and {b} are compared: {'; '.join(self._unmapped(*group) for group in groups)}"
         row = self.worst
         if row is None or row.difference == 0:
             return f"{a} and {b} need the same torques at rest: no difference of N found"
@@ -139,6 +138,14 @@ class RobotDifference(Answer):
         if self.largest:
             yield ""
             yield from self._cost()
+
+    def _unmapped(self, file: str, obstacle: Obstacle) -> str:
+        """Return the unmapped joints of a file with one obstacle, and the remedy."""
+        own, other = self.names[:: 1 if file == "a" else -1]
+        joints = [x.joint for x in self.unmapped if (x.file, x.obstacle) == (file, obstacle)]
+        listed = ", ".join(joints[:_LISTED]) + f", … ({len(joints)} in all)" * (len(joints) > _LISTED)
+        where = f" in {other}" if obstacle is Obstacle.MISSING else ""
+        return f"{listed} of {own}: {obstacle}{where}; {_REMEDIES[obstacle]}"
 
     def _map(self) -> Iterator[Block]:
         a, b = self.names
@@ -345,12 +352,6 @@ def _differing(
         tiny = 1e-12 * (scale if np.isfinite(scale) else 1.0)
         rounded = (tuple(0.0 if abs(value) <= tiny else float(value) for value in values) for values in (x, y))
         yield Difference(joint, quantity, unit, *rounded)
-
-
-def _obstacle(x: Unmapped, names: tuple[str, str]) -> str:
-    file = names[x.file == "b"]
-    reason = f"{x.obstacle} in {names[x.file == 'a']}" if x.obstacle is Obstacle.MISSING else x.obstacle.value
-    return f"joint {x.joint!r} of {file}: {reason}; {_REMEDIES[x.obstacle]}"
 
 
 def _of_effort(row: LargestDifference) -> str:
