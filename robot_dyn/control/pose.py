@@ -211,7 +211,8 @@ def _shortest(a: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 def _orthogonal(axes: np.ndarray) -> np.ndarray:
     """Return orthonormal rows orthogonal to k orthonormal axes, (3 − k, 3)."""
-    return np.linalg.svd(axes)[2][len(axes) :]
+    _, _, V = np.linalg.svd(axes)
+    return V[len(axes) :]
 
 
 def logarithm(R: np.ndarray, p: np.ndarray) -> np.ndarray:
