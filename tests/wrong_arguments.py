@@ -37,11 +37,12 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "Excitation",
-    "ExpectedPrecision", "HeldOut", "Identification", "InverseKinematics", "Meaning", "MotorBudget", "Motors",
-    "Parameter", "PathPlan", "PayloadEstimate", "Plan", "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference",
-    "SampledModel", "Sensitivity", "State", "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations",
-    "Trajectory", "Verdict", "WorkPrecision",
+    "Advice", "AlarmThreshold", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Contact",
+    "Cost", "Estimate", "Excitation", "ExternalTorque", "ExpectedPrecision", "HeldOut", "Identification",
+    "InverseKinematics", "Meaning", "MotorBudget", "Motors", "Parameter", "PathPlan", "PayloadEstimate", "Plan",
+    "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State",
+    "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations", "Trajectory", "Verdict", "WorkPrecision",
+    "RobotDifference",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -177,6 +178,7 @@ def examples(folder: Path) -> dict[str, Example]:
     pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
     points, eye = [q, u, v], np.eye(3)
     sampled = rd.control.PD(hold, kp=9.0, kd=6.0, period_s=0.01)
+    external = rd.control.external_torque(robot, [0.0, 2.0], [q, q], [v, v], [u, u], bandwidth_rad_s=9.0)
     path: Any = rd.control.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     made |= {thing.__name__: (thing, arguments(thing)) for thing in (*EFFECTS.values(), rd.effects.joint_stops)}
     calls = [
@@ -193,6 +195,12 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.effects.ExternalWrench("pole", np.ones(6)).acts, t=0.1),
         call(rd.effects.ExternalWrench("pole", np.ones(6)).at, placement=np.eye(4)),
         call(rd.control.FeedForward, **pair),
+        call(rd.control.MomentumObserver, controller=sampled, model=robot, bandwidth_rad_s=9.0, effects=plant.torque),
+        call(rd.control.MomentumObserver(sampled, robot, bandwidth_rad_s=9.0).recorded, t=[0.0, 1.0],
+            z=np.zeros((2, 9))),
+        call(external.block_maxima, block_s=2.0),
+        call(external.contacts, threshold=[1.0, 2.0]),
+        call(external.threshold, alarms_per_hour=1800.0, block_s=2.0, level=0.9),
         call(rd.control.Loop, controller=sampled, position=[rd.control.Quantisation(1e-3)],
             velocity=[rd.control.Differences()], actuation=[rd.control.RateLimit(9.0)], measurement_delay_periods=1.5,
             actuation_delay_periods=0.5, noise_seed=3, run=1),
@@ -265,6 +273,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
             density=1000.0, allow_overlap=False, units=True,
             inertia_unit="kg mm2", xacro=None),
+        call(rd.tools.doctor.diff_robots, a=robot, b=robot, joints={"slide": "slide"}, signs={"slide": -1},
+            offsets={"hinge": 0.1}, tolerance=0.5, samples=3, seed=3),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
         call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), minimum=0.5, exclusive_minimum=0.5,
@@ -274,6 +284,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.from_samples, arm=robot, source={"slide": [0.1, 0.2, 0.3], "hinge": [0.1, 0.3, 0.4]},
             time=[0.0, 1.0, 2.0], joints={"slide": "slide", "hinge": "hinge"}, unit="rad", ends="measured", q0=q,
             start_s=0.5, topic=None),
+        call(rd.control.external_torque, arm=robot, t=[0.0, 1.0], q=[q, q], v=[v, v], tau=[u, u], bandwidth_rad_s=9.0,
+            effects=plant.torque, rest_s=(0.0, 1.0), held=True),
         call(rd.control.gains_from, inertia_diagonal=[1.0, 2.0], bandwidth_rad_s=3.0, damping_ratio=0.9),
         call(rd.control.hold, q=q),
         call(rd.control.inverse_kinematics, arm=robot, pose=robot.placement(q, "pole"), frame="pole", q0=q, seed=1,
@@ -321,7 +333,7 @@ def examples(folder: Path) -> dict[str, Example]:
             v1=0.0, start_s=0.1),
         call(rd.control.quintic, q0=q, q1=v, duration_s=1.0, start_s=0.1, v0=0.1, v1=u, a0=u, a1=0.0),
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
-        call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
+        call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True, names=["swing"]),
         call(rd.rollouts, system=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
         call(rd.tools.step.Stepper, plant=plant, n=2, period_s=0.02, controller=sampled, step_s=2e-3, method="RK4",

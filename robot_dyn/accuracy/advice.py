@@ -28,7 +28,7 @@ from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest, jacobian
-from robot_dyn.simulation.dynamics.sampled_loop import linearised, remedy
+from robot_dyn.simulation.dynamics.sampled_loop import continuous_form, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import (
     LARGEST,
     Stability,
@@ -222,7 +222,8 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     if coupled := [x.name for x in plant.equation_of_motion.drives.values() if x.coupled]:
         raise QueryError(f"advise: {coupled[0]} couples and releases motors in turn; no single linearisation is valid")
     period = 0.0 if controller is None else controller.period_s
-    loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
+    continuous = None if controller is None else continuous_form(controller, 0.0, setup.q0, setup.v0)
+    loop = StateEquation(plant, continuous).in_a_mode
     motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
     n, chosen = plant.dynamics.n, setup.method

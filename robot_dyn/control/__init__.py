@@ -7,6 +7,7 @@
     joint motions      quintic, via_points, hold (PiecewisePolynomial), Samples
     recorded motions   from_samples: from files, data frames, logs and arrays (Plan)
     motions of a frame line, circle (CartesianReference); inverse_kinematics (InverseKinematics)
+    external torque    MomentumObserver; external_torque (ExternalTorque, Contact, AlarmThreshold)
     a real loop        Loop with delays and blocks: Quantisation, Differences, LowPass, RateLimit, Noise
     to write one       Controller, Stateless, Block, Reference: base classes
 

@@ -5,6 +5,9 @@ from robot_dyn.control.cartesian import line as line
 from robot_dyn.control.computed_torque import ComputedTorque as ComputedTorque
 from robot_dyn.control.computed_torque import FeedForward as FeedForward
 from robot_dyn.control.computed_torque import PDGravity as PDGravity
+from robot_dyn.control.contact import AlarmThreshold as AlarmThreshold
+from robot_dyn.control.contact import Contact as Contact
+from robot_dyn.control.contact import ExternalTorque as ExternalTorque
 from robot_dyn.control.controller import ControlLaw as ControlLaw
 from robot_dyn.control.controller import Controller as Controller
 from robot_dyn.control.controller import Stateless as Stateless
@@ -18,6 +21,8 @@ from robot_dyn.control.digital_loop.low_pass import LowPass as LowPass
 from robot_dyn.control.independent_joint import PD as PD
 from robot_dyn.control.independent_joint import PID as PID
 from robot_dyn.control.independent_joint import gains_from as gains_from
+from robot_dyn.control.momentum_observer import MomentumObserver as MomentumObserver
+from robot_dyn.control.momentum_observer import external_torque as external_torque
 from robot_dyn.control.operational_space import OperationalSpace as OperationalSpace
 from robot_dyn.control.operational_space import TaskDynamics as TaskDynamics
 from robot_dyn.control.operational_space import task_dynamics as task_dynamics

@@ -23,7 +23,7 @@ from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, rotor
 from robot_dyn.simulation.results.causes import broken_away, effect_torques, plant_of
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger, leak
-from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin, settings_text
+from robot_dyn.simulation.results.provenance import bits_of_machine_code, edits_of_machine_code, origin, settings_text
 from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
@@ -107,7 +107,7 @@ class Results:
     @property
     def metadata(self) -> dict[str, str]:
         """Texts: origin, settings, changes by machine code, and the texts of the setup."""
-        edits = edits_of_machine_code(self.setup) if self.compiled else {}
+        edits = edits_of_machine_code(self.setup) | bits_of_machine_code() if self.compiled else {}
         texts = frame_of(self.setup) | rotors_of(self.setup) | settings_text(self.setup)
         return texts | origin(self.setup.plant.dynamics) | edits | self.texts
 

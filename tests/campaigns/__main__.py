@@ -58,6 +58,8 @@ def campaigns() -> list[Campaign]:
         Campaign("sweeps, killed", "tests.campaigns.sweep_kills", ("--workers", "20"), "--drivers", 50),
         Campaign("batches and single runs", "tests.campaigns.batches", (), "--scenes", 300),
         Campaign("pairs of runs", "tests.campaigns.run_pairs", (), "--pairs", 200),
+        Campaign("exported C", "tests.campaigns.exported_c"),
+        Campaign("formulas", "tests.campaigns.symbols"),
         Campaign("faults of arms in logs", "tests.campaigns.identify", ("--clean", "100"), "--logs", 10),
         Campaign("estimates, thin layers", estimates, (), "--layers", 400),
         Campaign("accuracy asked for, smooth", estimates, (), "--requests", 400),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,6 +44,34 @@ def test_a_short_run_makes_no_loop_stable(period: float, duration: float) -> Non
         in advice.text
     )
     assert (advice.run is None) == (advice.growth > 1e3)  # what the run bears is run
+
+
+@dataclass(frozen=True, eq=False)
+class Braking(rd.control.Stateless):
+    """Stop a mass of 1 kg within a period if c is 1: τ = −k q − c v / T."""
+
+    c: float
+    period_s: float = 0.02
+    n = property(lambda self: 1)
+
+    def torque(self, t: float, q: Any, v: Any, z: Any) -> Any:
+        return -100.0 * q - self.c / self.period_s * v
+
+    def thresholds(self) -> tuple[()]:
+        return ()
+
+
+@pytest.mark.parametrize("c", [1.0, 3.0])
+def test_a_law_that_divides_by_its_period_is_judged_at_it(c: float) -> None:
+    """Such a law has no continuous form. The radius of the map of a period: u = (−100, −c/T) is held for T."""
+    law = Braking(c)
+    T = law.period_s
+    radius = np.abs(np.linalg.eigvals(np.array([[1, T], [0, 1]]) + np.outer([T**2 / 2, T], [-100.0, -c / T]))).max()
+    advice = rd.advise(BLOCK, [0.1], duration_s=0.2, controller=law, engine="interpreted")
+    assert advice.period_growth == pytest.approx(radius, rel=1e-6)
+    run = rd.simulate(BLOCK, [0.1], duration_s=0.2, controller=law, engine="interpreted")
+    unstable = any(remark.kind is RemarkKind.UNSTABLE for remark in run.remarks)
+    assert unstable == (radius > 1) == (not advice.stable)
 
 
 def test_a_period_is_judged_itself_where_a_shorter_one_is_unstable() -> None:

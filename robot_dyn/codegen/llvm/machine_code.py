@@ -16,6 +16,7 @@ import llvmlite.binding as binding
 from llvmlite import ir
 
 from robot_dyn.codegen.llvm import python_function
+from robot_dyn.codegen.llvm.target import Target, this_target
 
 if TYPE_CHECKING:
     from robot_dyn.codegen.store.cache import Store
@@ -72,25 +73,27 @@ def addresses(
         return tuple(_engine().get_function_address(name + function) for function in functions)
 
 
-def object_file(write: Write, name: str, passes: Passes = _ALL) -> bytes:
-    """Compile a module to an object file."""
-    module = _optimised(write, name, passes.level)
+def object_file(write: Write, name: str, passes: Passes = _ALL, target: Target | None = None) -> bytes:
+    """Compile a module to an object file, for this processor or another target."""
+    target = target or this_target()
+    module = _optimised(write, name, target, passes.level)
     effort = passes.effort
     if effort is None:
         effort = 1 if str(module).count("\n") > _LONG else 3
-    return _machine(effort).emit_object(module)
+    return target.machine(effort).emit_object(module)
 
 
 def assembly(write: Write, name: str) -> str:
     """Return the instructions of a module's machine code as text."""
-    return _machine().emit_assembly(_optimised(write, name))
+    target = this_target()
+    return target.machine().emit_assembly(_optimised(write, name, target))
 
 
-def _optimised(write: Write, name: str, level: int = 3) -> binding.ModuleRef:
-    module, machine = ir.Module(name), _machine()
+def _optimised(write: Write, name: str, target: Target, level: int = 3) -> binding.ModuleRef:
+    module, machine = ir.Module(name), target.machine()
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     write(module, name)
-    parsed = binding.parse_assembly(str(module))
+    parsed = binding.parse_assembly(target.written(str(module)))
     options = binding.create_pipeline_tuning_options(speed_level=level)
     options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = (
         False  # the code is vectorised already
@@ -111,21 +114,9 @@ def _opened(payload: bytes | None) -> bytes | None:
     return code if payload == _sealed(code) else None
 
 
-def _machine(effort: int = 3) -> binding.TargetMachine:
-    """Return the LLVM target machine for this processor."""
-    binding.initialize_native_target()
-    binding.initialize_native_asmprinter()
-    target = binding.Target.from_triple(binding.get_process_triple())
-    reloc = "static" if target.name.startswith("x86") else "default"
-    features = binding.get_host_cpu_features().flatten()
-    return target.create_target_machine(
-        cpu=binding.get_host_cpu_name(), features=features, opt=effort, reloc=reloc, codemodel="jitdefault", jit=True
-    )
-
-
 @cache
 def _engine() -> binding.ExecutionEngine:
     """Return the execution engine into which this process loads all machine code."""
     for name, location in python_function.addresses().items():
         binding.add_symbol(name, location)
-    return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
+    return binding.create_mcjit_compiler(binding.parse_assembly(""), this_target().machine())

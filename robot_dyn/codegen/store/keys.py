@@ -37,11 +37,11 @@ def digest_of_texts(texts: Iterable[str]) -> str:
     return hashlib.sha256(joined.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def processor_of_code() -> tuple[str, str]:
-    """Return the name and features of the processor that machine code is compiled for."""
-    import llvmlite.binding as llvm
+def processor_of_code() -> tuple[str, ...]:
+    """Return the name and features of the processor that machine code is compiled for, and "portable" if it is that."""
+    from robot_dyn.codegen.llvm.target import this_target
 
-    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    return this_target().key
 
 
 @cache

@@ -18,7 +18,12 @@ ABSENT = "—"
 _NAMED = 36  # longest name of a setting, and longest value, in letters, that names a run
 _LONG = re.compile(r"-?\d+\.\d{4,}(?:e[-+]?\d+)?")
 _UNIT = re.compile(r"^(-?[\d.]+(?:e[-+]?\d+)?) [^,]*$")  # a single number with its unit
-_TEXTS = {"frame": "frame of the control", "right_angles": "right angles, in machine code", "versions": "versions"}
+_TEXTS = {
+    "frame": "frame of the control",
+    "right_angles": "right angles, in machine code",
+    "bits": "bits of machine code",
+    "versions": "versions",
+}
 
 
 @final

@@ -11,6 +11,7 @@ The two integrals are one exponential. [Åström, Wittenmark, Computer-Controlle
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, log
@@ -120,6 +121,16 @@ def remedy(continuous_growth_rate: float) -> str:
     )
 
 
+def continuous_form(controller: Controller, t: float, q: Array, v: Array) -> Controller:
+    """Return the controller for continuous control; with its period if its law at (t, q, v) divides by the period."""
+    continuous = controller.at_period(0.0)
+    z = np.zeros(continuous.state_size)
+    with suppress(ZeroDivisionError), np.errstate(all="ignore"):
+        if all(np.isfinite(call(law, t, q, v, z)).all() for law in (continuous.torque, continuous.state_rate)):
+            return continuous
+    return continuous.at_period(controller.period_s)
+
+
 def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> SampledLoop:
     """Return the loop about a state.
 
@@ -131,9 +142,9 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> Samp
     """
     from scipy.linalg import expm
 
-    controller = controller.small_signal()
-    continuous = controller.at_period(0.0)
-    n, size, free = plant.dynamics.n, continuous.state_size, StateEquation(plant, None).in_a_mode
+    n, controller, free = plant.dynamics.n, controller.small_signal(), StateEquation(plant, None).in_a_mode
+    continuous = continuous_form(controller, t, y[:n], y[n : 2 * n])
+    size = continuous.state_size
     law = y[: 2 * n + size]
     x = np.concatenate([y[: 2 * n], y[2 * n + size :], np.zeros(len(free.sources))])
     u = _law(continuous.torque, t, n)(t, law)

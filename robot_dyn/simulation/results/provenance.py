@@ -21,6 +21,7 @@ from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Payload
 from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.foundations.extras import version_of
+from robot_dyn.foundations.portable_bits import has_portable_bits
 from robot_dyn.model.findings import reservations
 from robot_dyn.model.right_angles import written_out
 from robot_dyn.model.robot import Robot
@@ -49,6 +50,11 @@ def edits_of_machine_code(setup: Setup) -> dict[str, str]:
     """Return the changes of machine code to a setup as texts of a run: right angles of plant and models."""
     edited_angles = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
     return {"right_angles": edited_angles} if edited_angles else {}
+
+
+def bits_of_machine_code() -> dict[str, str]:
+    """Return "portable" as a text of a run if its machine code is portable."""
+    return {"bits": "portable"} if has_portable_bits() else {}
 
 
 def settings_text(setup: Setup) -> dict[str, str]:

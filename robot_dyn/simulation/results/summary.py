@@ -30,6 +30,7 @@ def summary(run: TrajectoryData) -> str:
         opening + _after(run.outcome.text),
         *([] if run.acting is None else [f"effects: {', '.join(run.acting) or 'none'}"]),
         *([f"right angles, in machine code: {run.metadata['right_angles']}"] if "right_angles" in run.metadata else []),
+        *([f"bits of machine code: {run.metadata['bits']}"] if "bits" in run.metadata else []),
         f"energy ledger: {residual}" + _after(run.leak) if ledger.is_recorded else "energy ledger: was not recorded",
         f"error of q [{unit}]: {run.error or _not_estimated(run)}",
         *about_the_robot(run),

@@ -123,6 +123,8 @@ class Identification(Answer, Value):
             float(np.sqrt(np.nansum(x**2))) for x in (self.held_out.identified, self.held_out.file_with_friction)
         )
         cause = self.verdict.first[0].text if self.verdict.first else "no cause of a difference is seen"
+        if self.verdict.seen and not self.verdict.has_single_cause:
+            cause = f"no single cause explains more than {self.verdict.causes[0].explained:.0%} of the difference"
         return f"{self.arm}: held-out error {new:.3g}, {old:.3g} with the file's numbers and fitted friction; {cause}"
 
     def blocks(self) -> Iterator[Block]:

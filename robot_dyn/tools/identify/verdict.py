@@ -1,9 +1,10 @@
 """The verdict: ranked causes of the difference between an arm's file and a log.
 
-    r = τ − Y θ_file,   S(cause) = min_x ‖W (r − C x)‖²,   BIC = S + k log N
+    r = τ − Y θ_file,   S(cause) = min_x ‖W (r − C x)‖²,   BIC = S/ĉ + k log N,   ĉ = max(1, min S/N)
 
-C are the derivatives of the torque by the cause. Causes whose BIC differs by less than 6 are not distinguished by
-the log and are named together. [Schwarz 1978; Kass, Raftery 1995]
+C are the derivatives of the torque by the cause. What the best cause leaves above the noise counts as noise (ĉ). Causes
+whose BIC differs by less than 6 are not distinguished by the log and are named together.
+[Schwarz 1978; Kass, Raftery 1995; Burnham, Anderson 2002]
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ if TYPE_CHECKING:
     Columns = Callable[..., np.ndarray]
 
 SEEN = 3.0  # rms of the residual of a joint, in units of its noise, from which a difference is seen
+ALONE = 0.9  # part of the difference that a single cause explains
 SAME = 6.0  # difference in BIC: "strong" evidence
 _SMALL = 1e-5  # [rad] or [m]
+_SHOWN = 4  # coefficients of a cause
 _NOTHING = 1e-9  # [N m] per unit
 
 
@@ -37,14 +40,14 @@ class Cause(Value):
     """A possible cause of the difference between file and log.
 
     Attributes:
-        kind: "mass", "centre of mass", "friction", "torque offset", "position offset", "mounting", "gain" or
+        kind: "load", "mass", "centre of mass", "friction", "torque offset", "position offset", "mounting", "gain" or
             "time offset".
         where: Link or joint; empty for the whole arm.
-        values: Estimates of its coefficients.
+        values: Estimates of its coefficients; of a load, mass and first moment.
         half_widths: Half widths of their 95 % intervals.
         unit: Unit of the coefficients.
         explained: Part of the difference that it explains, of what the whole model explains.
-        bic: S + k log N.
+        bic: S/ĉ + k log N.
     """
 
     kind: str
@@ -85,6 +88,11 @@ class Verdict(Value):
     def seen(self) -> bool:
         """True if the residual of a joint is at least three times its noise; otherwise no cause can be seen."""
         return bool(np.nanmax(self.ratios) >= SEEN)
+
+    @reported
+    def has_single_cause(self) -> bool:
+        """True if the first cause explains at least 90 % of the difference; otherwise there are several."""
+        return self.seen and self.causes[0].explained >= ALONE
 
     @property
     def first(self) -> tuple[Cause, ...]:
@@ -135,8 +143,11 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
         k, chi2 = C.shape[1], float(((y - fitted) ** 2).sum())
         spread = 1.96 * np.sqrt(np.diag(covariance)[:k] * max(chi2 / count, 1.0))
         part = (start - chi2) / max(start - full, 1e-300)
-        causes.append(Cause(kind, where, x[:k] * factor, spread * factor, unit, part, chi2 + k * np.log(count)))
-    return Verdict(ratios, tuple(sorted(causes, key=lambda cause: cause.bic)))
+        values, widths = (x[:k] * factor)[:_SHOWN], (spread * factor)[:_SHOWN]
+        causes.append((chi2, k * np.log(count), (kind, where, values, widths, unit, part)))
+    dispersion = max(1.0, min((chi2 for chi2, *_ in causes), default=0.0) / count)
+    ranked = (Cause(*cause, float(chi2 / dispersion + penalty)) for chi2, penalty, cause in causes)
+    return Verdict(ratios, tuple(sorted(ranked, key=lambda cause: cause.bic)))
 
 
 def _noise(y: np.ndarray, columns: np.ndarray, used: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -195,6 +206,10 @@ def _candidates(
         for k in range(3):
             whole[k, place] = links.X[b] @ shifted_centre(links.theta[b], k)
         yield "centre of mass", name, "m", 1.0, by_parameters(whole)
+    last = slice(links.theta.size - 10, links.theta.size)
+    load = np.zeros((10, links.theta.size))
+    load[:, last] = links.X[-1].T
+    yield "load", links.names[-1], "kg, kg m", 1.0, by_parameters(load)
     c = len(base.columns) + len(model.rotors)
     n = arm.n
     for i, (joint, kind) in joints:

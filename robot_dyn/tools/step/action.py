@@ -125,7 +125,7 @@ def action_of(controller: Controller | None, joints: tuple[str, ...], period_s: 
         point, labels = None, ()
     if point is None or len(references) > 1:
         kinds = ", ".join(type(x).__name__ for x in references.values()) or "no reference"
-        raise QueryError(f"controller: {controller.name} has {kinds}, which cannot be commanded; {REMEDY}")
+        raise QueryError(f"controller: {controller.name} has {kinds}, so that no set-point can be the action; {REMEDY}")
     cycle_s = controller.period_s * controller.cycle
     cycles = max(1, round(min(period_s / cycle_s, 1e9))) if cycle_s else 0
     if cycle_s and abs(period_s / cycle_s - cycles) > 1e-9 * cycles:

@@ -107,7 +107,9 @@ class Stepper:
         if vary is not None and not isinstance(vary, Mapping):
             raise QueryError(f"vary must give values by name, such as {{'mass_scale': …}}, got {shown(vary)}")
         for name, x in (vary or {}).items():
-            if name == action.parameter or len(np.atleast_1d(np.asarray(x))) != self._n:
+            if name == action.parameter:
+                raise QueryError(f"vary: {name} is the action of `step`; leave it out")
+            if len(np.atleast_1d(np.asarray(x))) != self._n:
                 raise QueryError(f"vary: give {name} for each of the {self._n} lanes, got shape {np.shape(x)}")
         actions = {action.parameter: np.zeros((self._n, len(action.labels)))}
         batch = batch_of(setup, None, None, {**(vary or {}), **actions}, ())

@@ -87,6 +87,7 @@ class VectorEnv(vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         q, v, goals = self._drawn(0)
         self._goals = np.tile(goals, (self.num_envs, 1))
         size = self._seen(stepper.reset(q, v)).shape[1]
+        self._episode[:] = -1  # until the first reset
         self.single_observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
         self.single_action_space = spaces.Box(-1.0, 1.0, (k,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (self.num_envs, size), np.float64)
@@ -106,7 +107,7 @@ class VectorEnv(vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             QueryError: If the seed is not a whole number from 0 on.
         """
         super().reset(seed=checked_seed(seed), options=options)
-        if seed is not None or self._np_random_seed is None:
+        if seed is not None or (self._episode < 0).all():
             self._seed = cast(int, self.np_random_seed)
             self._episode[:] = -1
         return self._seen(self._begin(np.ones(self.num_envs, bool))), {}
@@ -122,8 +123,10 @@ class VectorEnv(vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             "energy_residual" in [J], (n,), of a stepper with a ledger.
 
         Raises:
-            QueryError: If the actions have another shape or are not finite.
+            QueryError: If the actions have another shape or are not finite, or before the first reset.
         """
+        if (self._episode < 0).any():
+            raise QueryError("step: the environments have not been reset; call reset first")
         names, done, before = self._stepper.action_names, self._done, self._stepper.state
         scaled = np.clip(shaped("actions", actions, names), -1.0, 1.0)
         action = self._low + (scaled + 1.0) / 2.0 * (self._high - self._low)
@@ -180,6 +183,9 @@ class VectorEnv(vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         array = np.array(values, kind)
         if array.shape != (self.num_envs,):
             raise QueryError(f"{name} must return one value for each of the {self.num_envs} lanes, got {array.shape}")
+        if not np.isfinite(array).all():
+            lane = int(np.argmin(np.isfinite(array)))
+            raise QueryError(f"{name} of lane {lane} is {array[lane]}; return finite numbers")
         return array
 
 

@@ -307,12 +307,12 @@ class SweepResult(Answer):
 
     @property
     def processors(self) -> dict[str, int]:
-        """Number of chunks by processor; the last bits of rows may differ between processors with other features."""
+        """Number of chunks by processor, whose features decide the last bits of rows; "portable" counts as one."""
         count = Counter[str]()
         for chunk in np.flatnonzero(self.folder.present()).tolist():
             footer = self.folder.footer(chunk)
             features = sha256(str(footer.get("features")).encode()).hexdigest()[:8]
-            count[f"{footer.get('processor')} (features {features})"] += 1
+            count[footer.get("bits") or f"{footer.get('processor')} (features {features})"] += 1
         return dict(count)
 
     @reported

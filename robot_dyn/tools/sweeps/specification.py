@@ -39,9 +39,10 @@ def versions() -> dict[str, str]:
 
 
 def processor() -> dict[str, str]:
-    """Return name and features of the processor."""
-    name, features = processor_of_code()
-    return {"processor": name, "features": ",".join(text[1:] for text in features.split(",") if text.startswith("+"))}
+    """Return name and features of the processor, and "bits" if its machine code is portable."""
+    name, features, *bits = processor_of_code()
+    enabled = ",".join(text[1:] for text in features.split(",") if text.startswith("+"))
+    return {"processor": name, "features": enabled} | ({"bits": bits[0]} if bits else {})
 
 
 class _SetupOfFunction(BaseModel):

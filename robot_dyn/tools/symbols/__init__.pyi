@@ -8,4 +8,5 @@ __all__: list[str]
 
 # Names that tests import of this folder.
 from robot_dyn.tools.symbols.letters import Lettering as Lettering
+from robot_dyn.tools.symbols.letters import independent as independent
 from robot_dyn.tools.symbols.polynomials import Numbers as Numbers

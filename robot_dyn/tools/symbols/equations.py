@@ -14,7 +14,7 @@ from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.foundations import QueryError, first_moment, needs, shown
 from robot_dyn.lagrange import FORMULAS, Linkage, Pose, linkage_of, tree_of
 from robot_dyn.tools.symbols.fourier import expression, shortest
-from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle
+from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle, independent
 from robot_dyn.tools.symbols.polynomials import Letter, Numbers, Polynomials, Turn
 
 if TYPE_CHECKING:
@@ -108,10 +108,7 @@ class SymbolicEquations:
         import sympy as sp
 
         if self.terms["M"] + self.terms["N"] > READABLE:
-            raise QueryError(
-                f"no readable form: M has {self.terms['M']} terms, N {self.terms['N']}; lock joints by"
-                " arm.with_(lock={...}), pass letters='base', or write C code by rd.tools.export.c_source(arm)"
-            )
+            raise _unreadable(f"M has {self.terms['M']} terms, N {self.terms['N']}", self.lettered)
         names = {sp.Symbol(f"v{k + 1}", real=True): rf"\dot{{q}}_{{{k + 1}}}" for k in range(self.n)}
         lines = []
         for name, matrix in (("M", self.M), ("C", self.C), ("N", self.N)):
@@ -169,15 +166,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
         raise QueryError(f"arm must be a Robot, for example rd.load('ur5'), got {shown(arm)}")
     if letters is not None and not (isinstance(letters, str) and letters in ("file", "base")):
         raise QueryError(f"letters must be 'file', 'base' or None, got {shown(letters)}")
-    tree = tree_of(arm.description, arm.edits)
-    locked = {joint.name for joint in tree.joints if joint.kind == "fixed" or joint.locked is not None}
-    for joint in tree.joints:
-        source = joint.mimic.source if joint.mimic and joint.name not in locked else None
-        if source is not None and source not in locked:
-            raise QueryError(
-                f"joint {joint.name!r} follows {source!r}, and formulas need independent joints: lock it by"
-                f" arm.with_(lock={{{source!r}: 0.0}}), or remove its <mimic>"
-            )
+    tree = independent(tree_of(arm.description, arm.edits))
     lettering = Lettering(named=letters == "file", with_g=letters is not None)
     lettered = lettering.tree(tree, arm.joint_names)
     meanings = dict(lettering.letters)
@@ -205,11 +194,28 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     ]
     v = ring.array([Letter(name) for name in rates])
     at = linkage.at(q)
-    results: dict[str, Any] = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
+    try:
+        results: dict[str, Any] = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
+    except (OverflowError, SystemError) as error:
+        cause: BaseException | None = error
+        while isinstance(cause, SystemError):  # products of NumPy's objects raise one from the error of an operator
+            cause = cause.__cause__
+        if cause is None:
+            raise
+        raise _unreadable(f"an intermediate result has {cause}", letters) from None
     return _named(
         SymbolicEquations(
             arm, letters, meanings, tuple(lettering.rounded), results, _parallel(linkage, arm.joint_names)
         )
+    )
+
+
+def _unreadable(size: str, letters: str | None) -> QueryError:
+    """Return the error for equations that are too long to read."""
+    base = "" if letters == "base" else "use base parameters (--letters base, in Python letters='base'), "
+    return QueryError(
+        f"no readable form: {size}; {base}lock joints (--lock JOINT=VALUE, in Python arm.with_(lock={{...}})), or"
+        " export C (robot-dyn export-c, in Python rd.tools.export.c_source(arm))"
     )
 
 
@@ -240,7 +246,7 @@ def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[
     The letters follow Gautier and Khalil (1990): M mass, MX first moment, XX second moment in the joint's frame.
     """
     lettering = Lettering(named=False)  # the same angles as in the formulas, in floats
-    tree = lettering.tree(tree_of(arm.description, arm.edits), arm.joint_names)
+    tree = lettering.tree(independent(tree_of(arm.description, arm.edits)), arm.joint_names)
     numbers = regrouped(linkage_of(tree, arm.joint_names, Numbers({k: m.value for k, m in lettering.letters.items()})))
     inertias = np.array(numbers.inertias, dtype=float)
     largest = np.abs(inertias).max(axis=0)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, final
 
+from robot_dyn.foundations import QueryError
 from robot_dyn.lagrange import Inertial, Joint, Tree
 from robot_dyn.tools.symbols.polynomials import Angle, Component, Letter, twelfths_of
 
@@ -180,6 +181,31 @@ class Lettering:
         azimuth = self._angle(math.atan2(y, x), f"azimuth of the {where}") if across > TOLERANCE * abs(z) else Angle()
         elevation = self._angle(math.atan2(z, across), f"elevation of the {where}")
         return tuple(Component(azimuth, elevation, k) for k in range(3))
+
+
+def independent(tree: Tree) -> Tree:
+    """Return the tree with mimic joints locked where their drive is locked.
+
+    Raises:
+        QueryError: If a mimic joint moves.
+    """
+    by_name = {joint.name: joint for joint in tree.joints}
+
+    def position(joint: Joint) -> Fraction:
+        if joint.locked is not None:
+            return _value(joint.locked)
+        if joint.mimic is None:
+            raise QueryError(
+                f"formulas need independent joints, but a joint follows {joint.name!r}: lock both by"
+                f" --lock {joint.name}=0 (in Python arm.with_(lock={{{joint.name!r}: 0.0}})), or remove the <mimic>"
+            )
+        return _value(joint.mimic.multiplier) * position(by_name[joint.mimic.source]) + _value(joint.mimic.offset)
+
+    joints = (
+        replace(joint, locked=position(joint), mimic=None) if joint.mimic and joint.kind != "fixed" else joint
+        for joint in tree.joints
+    )
+    return replace(tree, joints=tuple(joints))
 
 
 def _value(literal: Any) -> Fraction:

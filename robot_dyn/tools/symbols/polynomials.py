@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, final
 
 import numpy as np
 
-from robot_dyn.foundations import Arithmetic, Numeral, QueryError
+from robot_dyn.foundations import Arithmetic, Numeral
 
 if TYPE_CHECKING:
     from flint import fmpq, fmpq_mpoly
 
-MAX_TERMS = 20_000  # of one polynomial; a page has some 40, and products of larger ones take minutes
+MAX_TERMS = 2000  # of one polynomial; those of the arms that are printed have 150 at most
 ROOTS = {"sqrt2": 2, "sqrt3": 3}
 
 
@@ -152,15 +152,11 @@ class Turn:
         """Return the cosine."""
         return self.c
 
-    # A locked joint is at ratio · value + offset, with ratio 1 and offset 0 where it follows no other.
-    def __rmul__(self, ratio: Polynomial) -> Turn:
-        if ratio != 1:
-            raise QueryError("a locked joint follows another with a multiplier: remove its <mimic>")
+    # A linkage places a locked joint at 1 · value + 0.
+    def __rmul__(self, one: Polynomial) -> Turn:
         return self
 
-    def __add__(self, offset: Polynomial) -> Turn:
-        if offset != 0:
-            raise QueryError("a locked joint follows another with an offset: remove its <mimic>")
+    def __add__(self, zero: Polynomial) -> Turn:
         return self
 
 
@@ -205,12 +201,9 @@ class Polynomials(Arithmetic):
         return circles + [(at(name), x[name] ** 2 - square) for name, square in ROOTS.items()]
 
     def reduced(self, value: fmpq_mpoly) -> fmpq_mpoly:
-        """Return the remainder by the relations; raise QueryError for a polynomial that is too long to read."""
+        """Return the remainder by the relations; raise OverflowError for a polynomial of too many terms."""
         if len(value) > MAX_TERMS:
-            raise QueryError(
-                f"the equations have more than {MAX_TERMS} terms, which nobody reads: lock joints by"
-                " arm.with_(lock={...}), pass letters='base', or write C code by rd.tools.export.c_source(arm)"
-            )
+            raise OverflowError(f"more than {MAX_TERMS} terms")
         if value:
             degrees = value.degrees()
             for index, relation in self._relations:

@@ -13,7 +13,7 @@ from robot_dyn.tools.identify import FourierSeries, Verdict, links_of
 
 ARMS = {"ur5": None, "panda": "panda_finger_joint1", "ur10": None, "xarm7": None, "ur3": None}
 FAULTS = (
-    "mass", "centre of mass", "torque offset", "mounting", "friction", "gain", "time offset",
+    "mass", "centre of mass", "torque offset", "mounting", "friction", "gain", "time offset", "load",
 )  # fmt: skip
 DURATION_S, STEP_S, HARMONICS = 20.0, 0.005, 16
 SPEED = 0.8  # of the velocity limit
@@ -96,6 +96,9 @@ def planted(seed: int, fault: str) -> Planted:
         where, link = links.names[k], links.theta[k]
         moved = 1.5 * link if fault == "mass" else shifted(link, rng)
         theta[k] += links.X[k] @ (moved - link)
+    if fault == "load":  # 0.5 to 2 kg up to 10 cm from the last link
+        links, unit = links_of(arm), np.array([1.0, *rng.uniform(-0.1, 0.1, 3), 0.04, 0.0, 0.04, 0.0, 0.0, 0.04])
+        where, theta[-1] = links.names[-1], theta[-1] + links.X[-1] @ (rng.uniform(0.5, 2.0) * unit)
     if fault == "mounting":
         angle = rng.uniform(0, 2 * np.pi)
         gravity = rotation(np.array([np.cos(angle), np.sin(angle), 0.0]), np.deg2rad(3.0)) @ gravity

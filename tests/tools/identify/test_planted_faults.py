@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.campaigns.identify.planted import FAULTS, judge, shifted
+from robot_dyn.tools.identify import identify
+from tests.campaigns.identify.planted import FAULTS, arm_named, judge, planted, shifted
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -13,6 +14,14 @@ def test_the_verdict_names_a_planted_fault(fault: str) -> None:
     """Of a log whose residual is at least three times the noise; a smaller one is not seen."""
     row = judge(3, fault)
     assert row.rank == 0 if row.ratio >= 3.0 else not row.first
+
+
+def test_two_faults_are_not_one_cause() -> None:
+    """A mass, and an offset of the first joint of a quarter of its torque: neither explains 90 %."""
+    case = planted(3, "mass")
+    tau = case.log["tau"] + 0.25 * np.eye(case.log["tau"].shape[1])[0] * case.log["tau"].std(axis=0)
+    assert identify(arm_named(case.arm), case.log, effects=case.effects).verdict.has_single_cause
+    assert not identify(arm_named(case.arm), case.log | {"tau": tau}, effects=case.effects).verdict.has_single_cause
 
 
 def test_a_clean_log_raises_no_alarm() -> None:

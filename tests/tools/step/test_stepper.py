@@ -347,7 +347,7 @@ def test_bad_input_is_one_error_with_its_remedy() -> None:
         ("viscous", lambda: stepper(3, vary={"viscous_friction.viscos": np.ones(3)})),
         ("3 lanes", lambda: stepper(3, vary={"mass_scale": np.ones(4)})),
         ("vary", lambda: stepper(3, vary=[1.0])),
-        ("torque_of_lane", lambda: stepper(3, vary={"torque_of_lane": np.ones((3, 2))})),
+        ("torque_of_lane is the action", lambda: stepper(3, vary={"torque_of_lane": np.ones((3, 2))})),
         ("ledger", lambda: arms.energy_residual),
         ("ledger", lambda: stepper(3, ledger=1)),
         ("DOP853", lambda: stepper(3, method="DOP853", step_s=None)),

@@ -145,6 +145,11 @@ def test_bad_input_is_one_error_with_its_remedy() -> None:
         ("time_limit_s", lambda: env(time_limit_s=0.0)),
         ("observe", lambda: env(observe=lambda state, goals: state.q[0])),
         ("reward", lambda: (bad := env(reward=lambda *_: 0.0)).reset(seed=0) and bad.step(np.zeros((3, 2)))),
+        (
+            "reward of lane 0",
+            lambda: (bad := env(reward=lambda *_: np.full(3, np.nan))).reset() and bad.step(np.zeros((3, 2))),
+        ),
+        ("reset first", lambda: env().step(np.zeros((3, 2)))),
         ("terminated", lambda: (bad := env(terminated=lambda *_: [True])).reset() and bad.step(np.zeros((3, 2)))),
         ("stepper", lambda: VectorEnv(ARM, **options())),  # pyright: ignore[reportArgumentType]
         ("one lane", lambda: Env(arms, **options())),

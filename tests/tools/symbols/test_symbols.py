@@ -4,34 +4,40 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 import sympy as sp
 
 import robot_dyn as rd
-from robot_dyn.foundations import MissingExtraError, QueryError
-from robot_dyn.lagrange import tree_of
-from robot_dyn.tools.symbols import Lettering, Numbers, SymbolicEquations, symbols
+from robot_dyn.foundations import MissingExtraError, QueryError, RobotDynWarning
+from robot_dyn.tools.symbols import SymbolicEquations, symbols
+from tests.command import run
+from tests.tools.symbols.in_pinocchio import differences, rate_is_C_plus_its_transpose
 
 OWN = Path(__file__).with_name("spatial_3r.urdf")
-ARMS: dict[str, tuple[str, str | None]] = {
-    "planar_2r": ("planar_2r", "file"),
-    "cart_pole": ("cart_pole", "file"),
-    "pendulum": ("pendulum", "file"),
-    "spatial_3r": (str(OWN), "file"),
-    "spatial_3r in numbers": (str(OWN), None),
-    "ur5": ("ur5", "base"),
-}
+ARMS = [  # a fifth of those that are printed; the others are in tests.campaigns.symbols
+    ("planar_2r", "file"), ("cart_pole", "file"), ("quadruped", "base"), ("flyball_governor", "base"),
+    (str(OWN), "file"), (str(OWN), None),
+]  # fmt: skip
+LONG = [("finger_edu", "file"), ("bolt", "file"), ("hextilt_flying_arm_5", "base"), ("b1", "base"), ("ur5", "base")]
 
 
-@pytest.fixture(scope="module", params=ARMS)
+def loaded(name: str) -> rd.Robot:
+    """A robot, its warnings ignored."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotDynWarning)
+        return rd.load(name)
+
+
+@pytest.fixture(scope="module", params=[*ARMS, *(pytest.param(arm, marks=pytest.mark.long) for arm in LONG)], ids=str)
 def equations(request: pytest.FixtureRequest) -> SymbolicEquations:
-    name, letters = ARMS[request.param]
-    return symbols(rd.load(name), letters)  # pyright: ignore[reportArgumentType]
+    name, letters = request.param
+    return symbols(loaded(name), letters)
 
 
 def test_two_bars_are_the_equations_of_the_lecture() -> None:
@@ -53,92 +59,13 @@ def test_two_bars_are_the_equations_of_the_lecture() -> None:
 
 
 def test_rate_of_the_mass_matrix_is_C_plus_its_transpose(equations: SymbolicEquations) -> None:
-    """Ṁ = Σ ∂M/∂q_k v_k = C + Cᵀ, as polynomials: with ds = c, dc = −s."""
-    M, C = equations.polynomials["M"], equations.polynomials["C"]
-    ring = C[0, 0].ring if hasattr(C[0, 0], "ring") else M[0, 0].ring
-    rate = 0 * M
-    for k in range(equations.n):
-        q, v = f"q{k + 1}", ring.generator(f"v{k + 1}")
-        for entry, x in np.ndenumerate(M):
-            if f"s_{q}" in ring.names:
-                s, c = ring.generator(f"s_{q}"), ring.generator(f"c_{q}")
-                change = x.derivative(f"s_{q}") * c - x.derivative(f"c_{q}") * s
-            else:
-                change = x.derivative(q)
-            rate[entry] = rate[entry] + change * v
-    assert all(rate[entry] == C[entry] + C.T[entry] for entry in np.ndindex(M.shape))
+    """Ṁ = Σ ∂M/∂q_k v_k = C + Cᵀ, as polynomials."""
+    assert rate_is_C_plus_its_transpose(equations)
 
 
 def test_formulas_equal_pinocchio_at_random_letters(equations: SymbolicEquations) -> None:
     """A model of Pinocchio with the same letters and rounded angles; both evaluate some hundred terms in float64."""
-    rng = np.random.default_rng(3)
-    base = any(name.startswith("ZZ") for name in equations.letters)  # such letters are values of the file's
-    values = {
-        name: meaning.value if base else meaning.value * rng.uniform(0.5, 2.0)
-        for name, meaning in equations.letters.items()
-    }
-    model, data = pinocchio_model(equations, values)
-    for _ in range(3):
-        q, v = rng.uniform(-2.0, 2.0, (2, equations.n))
-        M, C, N = (evaluated(x, equations, values, q, v) for x in (equations.M, equations.C, equations.N))
-        order = [model.joints[model.getJointId(name)].idx_v for name in equations.arm.joint_names]
-        full_q, full_v = np.empty(model.nq), np.empty(model.nv)
-        full_q[order], full_v[order] = q, v
-        expected = pin.crba(model, data, full_q)
-        expected = np.triu(expected) + np.triu(expected, 1).T
-        for ours, theirs in (
-            (M, expected),
-            (C, pin.computeCoriolisMatrix(model, data, full_q, full_v)),
-        ):
-            theirs = theirs[np.ix_(order, order)]
-            assert np.abs(ours - theirs).max() <= 1e-12 * max(1.0, np.abs(theirs).max())
-        theirs = pin.computeGeneralizedGravity(model, data, full_q)[order]
-        assert np.abs(N[:, 0] - theirs).max() <= 1e-12 * max(1.0, np.abs(theirs).max())
-
-
-def evaluated(matrix: Any, equations: SymbolicEquations, values: dict[str, float], q: Any, v: Any) -> np.ndarray:
-    names = [f"{x}{k + 1}" for x in "qv" for k in range(equations.n)]
-    arguments = [sp.Symbol(name, real=True) for name in (*names, *values)]
-    return np.array(sp.lambdify(arguments, matrix, cse=True)(*q, *v, *values.values()), dtype=float)
-
-
-def pinocchio_model(equations: SymbolicEquations, values: dict[str, float]) -> tuple[Any, Any]:
-    """Build a model joint by joint from the lettered tree, with the letters' values."""
-    named = any(name[0] == "m" for name in values)
-    lettering = Lettering(named=named, with_g=named)
-    arm = equations.arm
-    tree = lettering.tree(tree_of(arm.description, arm.edits), arm.joint_names)
-    every = {name: meaning.value for name, meaning in lettering.letters.items()} | values
-    every |= {
-        name: values[name.partition("_")[0]] for name in every if name[0] == "I" and name.partition("_")[0] in values
-    }
-    number = Numbers(every).number
-    model = pin.Model()
-    model.gravity = pin.Motion(np.array([*map(number, tree.gravity), 0.0, 0.0, 0.0]))
-    frames = {tree.root: (0, pin.SE3.Identity())}
-    for joint in tree.joints:
-        parent, at = frames[joint.parent]
-        at = at * pin.SE3(
-            pin.rpy.rpyToMatrix(*map(number, joint.rpy)), np.array([*map(number, joint.xyz)], dtype=float)
-        )
-        if joint.name in arm.joint_names:
-            axis = np.array([*map(number, joint.axis)])
-            kind = pin.JointModelPrismaticUnaligned if joint.kind == "prismatic" else pin.JointModelRevoluteUnaligned
-            parent, at = model.addJoint(parent, kind(axis), at, joint.name), pin.SE3.Identity()
-            armature = model.armature
-            armature[model.joints[parent].idx_v] = number(joint.armature)
-            model.armature = armature
-        frames[joint.child] = parent, at
-    for link in tree.links:
-        body, at = frames[link.name]
-        for part in link.inertials:
-            xx, xy, xz, yy, yz, zz = map(number, part.moments)
-            R = pin.rpy.rpyToMatrix(*map(number, part.rpy))
-            inertia = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-            model.appendBodyToJoint(
-                body, pin.Inertia(number(part.mass), np.array([*map(number, part.xyz)]), inertia), at
-            )
-    return model, model.createData()
+    assert max(differences(equations, np.random.default_rng(3)).values()) < 1e-12
 
 
 def test_difference_to_the_file_comes_from_rounded_angles(equations: SymbolicEquations) -> None:
@@ -170,10 +97,60 @@ def test_base_parameters_of_a_ur5_give_six_terms_of_N() -> None:
     assert found.terms["N"] == 6 and found.terms["M"] <= 186
 
 
-def test_equations_nobody_reads_are_refused() -> None:
-    arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.02})
-    with pytest.raises(QueryError, match="export"):
-        symbols(arm, None).latex()
+@pytest.mark.parametrize("letters", ["file", "base"])
+def test_equations_nobody_reads_are_refused(letters: Any) -> None:
+    """The remedies are for the command line and for Python; base parameters are none where they are in use."""
+    with pytest.raises(QueryError, match=r"export-c.*c_source") as refused:
+        symbols(loaded("skew_tree"), letters).latex()
+    assert ("--letters base" in str(refused.value)) == (letters == "file")
+
+
+GRIPPER = """<robot name="gripper"><link name="base"/><link name="arm"/><link name="left"/><link name="right"/>
+<joint name="swing" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+<joint name="close" type="revolute"><parent link="arm"/><child link="left"/><axis xyz="1 0 0"/><origin xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+<joint name="follow" type="revolute"><parent link="arm"/><child link="right"/><axis xyz="1 0 0"/><origin xyz="0 1 1"/>
+<mimic joint="close" multiplier="-0.5" offset="0.25"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+</robot>""".replace(
+    '<link name="arm"/><link name="left"/><link name="right"/>',
+    "".join(
+        f'<link name="{name}"><inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/><inertia ixx="0.3" iyy="0.4"'
+        ' izz="0.5" ixy="0.01" ixz="0" iyz="0"/></inertial></link>'
+        for name in ("arm", "left", "right")
+    ),
+)
+
+
+def test_mimic_joints_are_locked_with_their_drive() -> None:
+    """The remedy of the refusal: at 0.7 of the drive, the follower is at −0.5 · 0.7 + 0.25."""
+    arm = rd.Robot.from_text(GRIPPER)
+    with pytest.raises(QueryError, match=r"lock=\{'close': 0.0\}"):
+        symbols(arm)
+    locked = symbols(arm.with_(lock={"close": 0.7}))
+    assert max(locked.difference.values()) < 1e-14
+    angles = {meaning.value for name, meaning in locked.letters.items() if name.startswith("alpha")}
+    assert angles == {0.7, -0.1}
+    assert max(differences(locked, np.random.default_rng(4)).values()) < 1e-12
+
+
+def test_the_written_tex_has_one_equation_for_each_entry(tmp_path: Path) -> None:
+    """Braces and environments are balanced, and SymPy's reader of LaTeX is not needed: M, C, N are counted."""
+    path = tmp_path / "equations.tex"
+    import_module("robot_dyn.tools.symbols.command")  # registers it, also where an older version is installed
+    done = run("derive", "planar_2r", "-o", path)
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("%")]
+    assert (lines[0], lines[-1]) == (r"\begin{align*}", r"\end{align*}")
+    assert [line.split(" &= ")[0] for line in lines[1:-1]] == [
+        f"{name}_{{{place}}}" for name, places in (("M", "11 12 22"), ("C", "11 12 21"), ("N", "1 2"))
+        for place in places.split()
+    ]  # fmt: skip
+    for k, line in enumerate(lines[1:-1]):
+        assert line.count("&") == 1 and line.endswith(r"\\") == (k < len(lines) - 3)
+        depths = np.cumsum([(x == "{") - (x == "}") for x in line])
+        assert depths.min() == 0 == depths[-1]
+        assert line.count(r"\left(") == line.count(r"\right)")
 
 
 @pytest.mark.parametrize(("arm", "letters"), [("mimic_chain", "file"), ("planar_2r", "all"), (None, "file")])
