@@ -30,6 +30,7 @@ from robot_dyn.model.info import Info
 from robot_dyn.simulation.observation.remarks import RemarkKind
 from robot_dyn.simulation.rollouts.parameters import Parameters
 from robot_dyn.tools.doctor.checkup import Checkup
+from robot_dyn.tools.doctor.robot_difference import RobotDifference
 from robot_dyn.tools.export.source import CSource
 from robot_dyn.tools.identify.result import Identification
 from robot_dyn.tools.motors.motor_budget.fastest import FastestMotion
@@ -64,6 +65,7 @@ _CLOSING = """## Exit codes
 | 1 | `prove`: the proof ends before the requested time |
 | 1 | `budget`: a motor is too small |
 | 1 | `check-urdf`: a file has an error, or with `--fix` the repaired file |
+| 1 | `diff-robots`: N or M differ by more than the tolerance, or a joint has no counterpart |
 | 1 | `stress`: the library failed to predict or report a case |
 | 2 | an error, reported on standard error |
 | 130 | interrupted |
@@ -161,6 +163,7 @@ DOCUMENTS = (
         {"rows": Key("All runs, from coarse to fine, same as in the CSV table.", tuple[Point, ...])},
     ),
     Document("check-urdf FILE…", None, {"files": Key("One entry for each file.", tuple[Checkup, ...])}),
+    Document("diff-robots A B", RobotDifference),
     Document("identify ROBOT LOG", Identification),
     Document("certify ROBOT", Certificate),
     Document("prove SCENE.toml", Proof),

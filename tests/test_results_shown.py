@@ -24,6 +24,7 @@ MOST_TEXT, MOST_HTML = 8000, 250_000  # characters
 CELLS = {
     "compare": "rd.compare(arm, samples=5)",
     "check": "rd.tools.doctor.check_urdf('kinova')",
+    "diff_robots": "rd.tools.doctor.diff_robots(arm, arm.with_(mass_scale=1.1), samples=10)",
     "advise": "rd.advise(arm, q, duration_s=0.1, method='RK4', step_s=1e-3)",
     "prove": "rd.tools.proof.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
     "certify": "rd.accuracy.certify(arm, samples=100, repeats=1)",

@@ -42,6 +42,7 @@ RESULTS = {
     "InverseKinematics", "Meaning", "MotorBudget", "Motors", "Parameter", "PathPlan", "PayloadEstimate", "Plan",
     "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State",
     "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations", "Trajectory", "Verdict", "WorkPrecision",
+    "RobotDifference",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -272,6 +273,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
             density=1000.0, allow_overlap=False, units=True,
             inertia_unit="kg mm2", xacro=None),
+        call(rd.tools.doctor.diff_robots, a=robot, b=robot, joints={"slide": "slide"}, signs={"slide": -1},
+            offsets={"hinge": 0.1}, tolerance=0.5, samples=3, seed=3),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
         call(rd.effects.coefficient, unit="N m", symbol="f", shapes=((), ("n",)), minimum=0.5, exclusive_minimum=0.5,
@@ -330,7 +333,7 @@ def examples(folder: Path) -> dict[str, Example]:
             v1=0.0, start_s=0.1),
         call(rd.control.quintic, q0=q, q1=v, duration_s=1.0, start_s=0.1, v0=0.1, v1=u, a0=u, a1=0.0),
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
-        call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
+        call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True, names=["swing"]),
         call(rd.rollouts, system=setup, q0=[q, u], v0=[v, u], vary={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), uncut=True, numbers=[3, 1], threads=1, max_bytes=10**9),
         call(rd.tools.step.Stepper, plant=plant, n=2, period_s=0.02, controller=sampled, step_s=2e-3, method="RK4",

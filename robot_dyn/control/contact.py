@@ -123,16 +123,17 @@ class ExternalTorque(Answer, Value):
         """Largest |r| of each joint, (n,), in [N m] or [N]."""
         return np.abs(self.torque).max(axis=0)
 
-    def contacts(self, threshold: ArrayLike) -> tuple[Contact, ...]:
+    def contacts(self, threshold: ArrayLike | AlarmThreshold) -> tuple[Contact, ...]:
         """Return the intervals in which a joint exceeds its threshold; those less than 1/K apart are one contact.
 
         Args:
-            threshold: Largest |r| without contact, a scalar or (n,), in [N m] or [N], such as `AlarmThreshold.torque`.
+            threshold: Largest |r| without contact, a scalar or (n,), in [N m] or [N], or the result of `threshold`.
 
         Raises:
             ControlError: If the threshold has another shape, or is not positive.
         """
         shapes = (), (len(self.joint_names),)
+        threshold = threshold.torque if isinstance(threshold, AlarmThreshold) else threshold
         threshold = numbers("threshold", threshold, *shapes, above=0, error=ControlError)
         with np.errstate(over="ignore"):  # inf exceeds, too
             share = np.abs(self.torque) / threshold

@@ -112,7 +112,9 @@ class MomentumObserver(Controller):
     def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
         n, inside = self.n, z[: self.controller.state_size]
         r, p, rate, u, begun = (z[len(inside) + k * n : len(inside) + (k + 1) * n] for k in range(5))
-        p_now, rate_now = _momentum(self.model, q, v), _rate(self.model, self.effects, q, v)
+        p_now, rate_now = _momentum(self.model, q, v), _rate(self.model, q, v)
+        if self.effects is not None:
+            rate_now = rate_now + self.effects(q, v)
         external = (p_now - p) / self.period_s - (rate + rate_now) / 2 - u
         decay = np.exp(-np.asarray(self.bandwidth_rad_s) * self.period_s)
         r = begun * (decay * r + (1 - decay) * external)
@@ -186,7 +188,9 @@ def external_torque(
     K = numbers("bandwidth_rad_s", bandwidth_rad_s, (), (arm.n,), above=0, error=ControlError)
     function("effects", effects, _EFFECTS, error=ControlError)
     held = truth("held", held, error=ControlError)
-    h, p, rate = np.diff(t)[:, None], _momentum(arm, q, v), _rate(arm, effects, q, v)
+    h, p, rate = np.diff(t)[:, None], _momentum(arm, q, v), _rate(arm, q, v)
+    if effects is not None:
+        rate = rate + numbers("effects(q, v)", effects(q, v), shape, error=ControlError)
     acting = tau[:-1] if held else (tau[:-1] + tau[1:]) / 2
     external = np.diff(p, axis=0) / h - (rate[:-1] + rate[1:]) / 2 - acting
     offset = np.zeros(arm.n) if rest_s is None else _offset(t, q, external, rest_s)
@@ -202,10 +206,9 @@ def _momentum(model: Dynamics, q: Array, v: Array) -> Array:
     return model.inverse_dynamics(q, 0 * v, v) - model.N(q)
 
 
-def _rate(model: Dynamics, effects: Torque | None, q: Array, v: Array) -> Array:
-    """Return ṗ without motor and external torque: Cᵀ v − N."""
-    rate = model.coriolis_transpose(q, v) - model.N(q)
-    return rate if effects is None else rate + effects(q, v)
+def _rate(model: Dynamics, q: Array, v: Array) -> Array:
+    """Return the part of ṗ that the model gives: Cᵀ v − N."""
+    return model.coriolis_transpose(q, v) - model.N(q)
 
 
 def _offset(t: np.ndarray, q: np.ndarray, external: np.ndarray, rest_s: tuple[float, float]) -> np.ndarray:

@@ -292,7 +292,7 @@ def _pose(pose: Any, tool_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             d = _unit("the direction of the pose", R)  # only R a = d is compared, not all of R
             return homogeneous(np.outer(d, tool_axis), p), tool_axis[None]
     else:
-        g = numbers("pose", pose, (4, 4), error=PlanError)
+        g = numbers("a pose that is not a pair (position, rotation or None)", pose, (4, 4), error=PlanError)
         R, p = g[:3, :3], g[:3, 3]
         if np.any(g[3] != [0, 0, 0, 1]):
             raise PlanError(f"pose: its last row must be 0 0 0 1, got {g[3]}")

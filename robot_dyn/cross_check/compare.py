@@ -28,7 +28,11 @@ from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, QUANT
 from robot_dyn.queries.quantity import Quantity
 
 TOLERANCE = 1e-12
-_TWIST: dict[int | str, tuple[str, ...]] = {4: ("x", "y", "z", "1"), 6: ("x", "y", "z", "rx", "ry", "rz")}
+_TWIST: dict[int | str, tuple[str, ...]] = {
+    3: ("x", "y", "z"),
+    4: ("x", "y", "z", "1"),
+    6: ("x", "y", "z", "rx", "ry", "rz"),
+}
 
 
 def compare(
@@ -96,7 +100,8 @@ def _pairs(
             one, two = (quantity.ask(engine, state, *frame, **options) for engine in (robot, own))
             scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute, *frame)
             values[quantity.name], where = (one, two), "".join((*frame, *(f" ({axes})" for axes in options.values())))
-            yield Pair(quantity.name, one, two, scale, tolerance, tuple(names[x] for x in quantity.axes), where)
+            labels = names | {3: ("by q", "by v", "by a")} if quantity.axes == (3, "n", "n") else names
+            yield Pair(quantity.name, one, two, scale, tolerance, tuple(labels[x] for x in quantity.axes), where)
     (M, C, N), pin_C, ID = (values[name][1] for name in "MCN"), values["C"][0], values[INVERSE_DYNAMICS.name][0]
     rate, both = own.mass_matrix_derivative(q) @ v, size.C(v) + size.C(v).T
     yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, rate, both, tolerance, (robot.joint_names,) * 2)

@@ -144,6 +144,6 @@ class Couplings(Value):
         """Reduce a quantity of all joints to independent coordinates; "n" in `axes` marks joint axes of its shape."""
         if self.trivial or "n" not in axes:
             return values
-        if axes == ("n", "n"):
+        if axes[-2:] == ("n", "n"):
             return self.matrix(values)
         return self.columns(values) if axes[-1] == "n" else self.rows(values)

@@ -20,6 +20,7 @@ from robot_dyn.foundations.arithmetic import apply
 from robot_dyn.foundations.errors import MissingTimeError, OverflowedError, QueryError, RobotDynError, SingularError
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.foundations.validate import integer, rows
+from robot_dyn.lagrange.formula import formula
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -123,10 +124,16 @@ class EulerLagrange:
         return _finite(a)
 
     def __str__(self) -> str:
-        """Return the equation of motion in CasADi's notation, with intermediate results @i."""
-        t, q, v = _symbols(self.n)
+        """Return M a + b = Q and the entries that are not 0 as formulas in t, q1, …, v1, …; M is symmetric."""
+        import casadi as ca
+
+        t, (q, v) = ca.SX.sym("t"), (ca.vertcat(*(ca.SX.sym(f"{x}{k + 1}") for k in range(self.n))) for x in "qv")
         M, b = self.kernels["M"](t, q, v).reshape((self.n, self.n)), self.kernels["bias"](t, q, v)
-        return f"M a + b = Q\nM = {M}\nb = {b}"
+        comma = "," if self.n > 9 else ""
+        entries = {f"M{i + 1}{comma}{j + 1}": M[i, j] for i in range(self.n) for j in range(i, self.n)}
+        entries |= {f"b{i + 1}": b[i] for i in range(self.n)}
+        lines = [f"{name} = {formula(x)}" for name, x in entries.items() if not x.is_zero()]
+        return "\n".join(["M a + b = Q", *lines])
 
     def _evaluate(self, name: str, t: Any, q: Any, v: Any = None, *, shape: tuple[int, ...]) -> np.ndarray:
         if t is None and name in self.timed:

@@ -22,7 +22,14 @@ from robot_dyn.foundations.spatial import (
     hat,
     homogeneous,
 )
+from robot_dyn.lagrange.centroid import (
+    centre_of_mass,
+    centre_of_mass_jacobian,
+    centre_of_mass_jacobian_rate,
+    centroidal_momentum_matrix,
+)
 from robot_dyn.lagrange.christoffel import jacobian_derivative
+from robot_dyn.lagrange.inverse_dynamics_derivatives import position_derivative
 from robot_dyn.lagrange.linkage import BASE, Configuration
 from robot_dyn.lagrange.summand import (
     coriolis_matrix,
@@ -52,6 +59,10 @@ def _inverse_dynamics(at: Configuration, v: Array, a: Array) -> Array:
 
 def _forward_dynamics(at: Configuration, v: Array, tau: Array) -> Array:
     return acceleration(_M(at), tau - apply(_C(at, v), v) - _N(at), at.linkage.joint_names)
+
+
+def _inverse_dynamics_derivatives(at: Configuration, v: Array, a: Array) -> Array:
+    return np.stack(np.broadcast_arrays(position_derivative(at, v, a), 2 * _C(at, v), _M(at)), axis=-3)
 
 
 def _kinetic_energy(at: Configuration, v: Array) -> Array:
@@ -121,6 +132,11 @@ FORMULAS: dict[str, Callable[..., Scalar]] = {
     "kinetic_energy": _kinetic_energy,
     "potential_energy": _potential_energy,
     "momentum": lambda at, v: apply(_M(at), v),
+    "inverse_dynamics_derivatives": _inverse_dynamics_derivatives,
+    "centre_of_mass": centre_of_mass,
+    "centre_of_mass_jacobian": centre_of_mass_jacobian,
+    "centre_of_mass_jacobian_rate": centre_of_mass_jacobian_rate,
+    "centroidal_momentum_matrix": centroidal_momentum_matrix,
     "regressor": regressor,
     "placement": lambda at, link: homogeneous(*_placement(at, link)),
     "jacobian": _jacobian,

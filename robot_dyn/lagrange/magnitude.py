@@ -35,21 +35,27 @@ class Magnitudes:
         M: Terms of M, (n, n).
         dM: Terms of ∂M_ij/∂q_k, (n, n, n).
         N: Terms of N, (n,).
+        carried: Terms of m ∂c/∂q for the centre of mass c, each of its rows, (n,): N in unit gravity.
+        moment: Terms of m c, a number.
         V: Terms of the potential energy, a number.
         lever: Length of the linear part of each column of each link's Jacobian, by name, (n,).
         reach: Distance from the base to each link along the joints, by name.
         linkage: The linkage.
         columns: Lengths of the linear and angular parts of the columns of each body's Jacobian, (2, p).
+        reaches: Distance from the base to each body along the joints.
     """
 
     M: np.ndarray
     dM: np.ndarray
     N: np.ndarray
+    carried: np.ndarray
+    moment: float
     V: float
     lever: dict[str, np.ndarray]
     reach: dict[str, float]
     linkage: Linkage
     columns: tuple[np.ndarray, ...]
+    reaches: tuple[float, ...]
 
     def C(self, v: np.ndarray) -> np.ndarray:
         """Return the terms of the Coriolis matrix, (n, n)."""
@@ -58,6 +64,47 @@ class Magnitudes:
     def inverse_dynamics(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the terms of M a + C v + N, (n,)."""
         return self.M @ np.abs(a) + self.C(v) @ np.abs(v) + self.N
+
+    @property
+    def mass(self) -> float:
+        """Mass of the moving bodies."""
+        return sum(abs(float(inertia[0, 0])) for inertia in self.linkage.inertias)
+
+    def derivatives(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the terms of ∂τ/∂q, ∂τ/∂v, ∂τ/∂a, (3, n, n); all joints count as joints before."""
+        couplings, N = _absolute(self.linkage.couplings), len(self.linkage.bodies)
+        full_v, full_a = couplings.velocity(np.abs(v)), couplings.velocity(np.abs(a))
+        by_q, fall = np.zeros((N, N)), np.array([float(np.linalg.norm(self.linkage.gravity)), 0.0])
+        for body, block, J in zip(self.linkage.bodies, _blocks(self.linkage), self.columns, strict=True):
+            path = list(body.path)
+            V = J @ full_v[path]
+            A = fall + J @ full_a[path] + _bracket(V, V)
+            momentum = block @ V
+            F = block @ A + _dual(V, momentum)
+            dV = _bracket(V[:, None], J)
+            dA = _bracket(A[:, None], J) + _bracket(dV, V[:, None])
+            dF = block @ dA + _dual(V[:, None], block @ dV) + _dual(dV, momentum[:, None])
+            by_q[np.ix_(path, path)] += np.tensordot(F, _derivative(J), axes=(0, 0)) + J.T @ dF
+        return np.stack([couplings.matrix(by_q), 2 * self.C(v), self.M])
+
+    def carried_rate(self, v: np.ndarray) -> np.ndarray:
+        """Return the terms of m d/dt ∂c/∂q, each of its rows, (n,)."""
+        couplings = _absolute(self.linkage.couplings)
+        v, rate = couplings.velocity(np.abs(v)), np.zeros(len(self.linkage.bodies))
+        for body, block, J in zip(self.linkage.bodies, _blocks(self.linkage), self.columns, strict=True):
+            path = list(body.path)
+            rate[path] += block[0] @ (_derivative(J) @ v[path] + J * (J[1] @ v[path]))
+        return couplings.torque(rate)
+
+    def momentum_matrix(self) -> np.ndarray:
+        """Return the terms of A_G, (6, n): distances from the centre of mass are differences of positions."""
+        couplings, terms = _absolute(self.linkage.couplings), np.zeros((2, len(self.linkage.bodies)))
+        for body, block, J, reach in zip(
+            self.linkage.bodies, _blocks(self.linkage), self.columns, self.reaches, strict=True
+        ):
+            linear, angular = block @ J
+            terms[:, list(body.path)] += [linear, angular + (reach + self.moment / self.mass) * linear]
+        return np.repeat(couplings.columns(terms), 3, axis=0)
 
     def regressor(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the terms of Y, (n, 10 N)."""
@@ -77,15 +124,15 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
     """Compute the magnitudes of a linkage at q."""
     N, couplings = len(linkage.bodies), _absolute(linkage.couplings)
     steps = np.abs(linkage.couplings.position(q))
-    M, dM, gravity, V = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
+    M, dM, carried, moment = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
     g = float(np.linalg.norm(linkage.gravity))
     columns = tuple(_columns(linkage.bodies, body, steps) for body in linkage.bodies)
     for body, block, J in zip(linkage.bodies, _blocks(linkage), columns, strict=True):
         M_terms, dM_terms, weight = _terms(J, block)
         M[np.ix_(body.path, body.path)] += M_terms
         dM[np.ix_(body.path, body.path, body.path)] += dM_terms
-        gravity[list(body.path)] += g * weight
-        V += g * (block[0, 0] * _reach(linkage.bodies, body, steps) + block[0, 1])
+        carried[list(body.path)] += weight
+        moment += block[0, 0] * _reach(linkage.bodies, body, steps) + block[0, 1]
     lever, reach = {}, {}
     for name, (index, pose, _) in linkage.links.items():
         lever[name], reach[name] = np.zeros(N), float(np.linalg.norm(pose.p))
@@ -95,8 +142,12 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
             lever[name][list(body.path)] = lin + ang * reach[name]
             reach[name] += _reach(linkage.bodies, body, steps)
         lever[name] = couplings.torque(lever[name])
-    reduced = couplings.matrix(M), couplings.cube(dM), couplings.torque(gravity)
-    return Magnitudes(*reduced, V, lever, reach, linkage, columns)
+    carried = couplings.torque(carried)
+    reaches = tuple(_reach(linkage.bodies, body, steps) for body in linkage.bodies)
+    return Magnitudes(
+        M=couplings.matrix(M), dM=couplings.cube(dM), N=g * carried, carried=carried, moment=moment, V=g * moment,
+        lever=lever, reach=reach, linkage=linkage, columns=columns, reaches=reaches,
+    )  # fmt: skip
 
 
 def _absolute(couplings: Couplings) -> Couplings:
@@ -105,10 +156,23 @@ def _absolute(couplings: Couplings) -> Couplings:
 
 def _terms(J: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the terms of M (p, p), ∂M (p, p, p), and N in unit gravity (p,), for a body with columns J (2, p)."""
-    lin, ang = J
-    dJ = np.stack([np.outer(ang, lin) + np.outer(lin, ang), np.outer(ang, ang)])  # [:, j, k]
-    half = np.tensordot(block @ J, dJ, axes=(0, 0))  # [i, j, k]
+    half = np.tensordot(block @ J, _derivative(J), axes=(0, 0))  # [i, j, k]
     return J.T @ block @ J, half + half.swapaxes(0, 1), block[0] @ J
+
+
+def _derivative(J: np.ndarray) -> np.ndarray:
+    """Return the lengths of ∂J_j/∂q_k = [J_j, J_k], (2, p, p)."""
+    return _bracket(J[:, :, None], J[:, None, :])
+
+
+def _bracket(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """Return the lengths of [X, Y] from those of twists (linear, angular), (2, ...)."""
+    return np.stack([X[1] * Y[0] + X[0] * Y[1], X[1] * Y[1]])
+
+
+def _dual(X: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """Return the lengths of ad_Xᵀ F from those of a twist and a wrench (force, moment), (2, ...)."""
+    return np.stack([X[1] * F[0], X[0] * F[0] + X[1] * F[1]])
 
 
 def _coriolis(dM: np.ndarray, v: np.ndarray) -> np.ndarray:

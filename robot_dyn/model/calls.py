@@ -16,6 +16,7 @@ from numpy import ndarray
 
 from robot_dyn.foundations.spatial import hat
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
+from robot_dyn.model.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from robot_dyn.model.pinocchio_model import Built, link_frames
 from robot_dyn.queries.dynamics import Axes, entry
 
@@ -135,6 +136,11 @@ PINOCCHIO: dict[str, Callable[..., Call]] = {
     "kinetic_energy": _kinetic_energy,
     "potential_energy": lambda built: partial(pin.computePotentialEnergy, built.model),
     "momentum": _momentum,
+    "inverse_dynamics_derivatives": lambda built: partial(inverse_dynamics_derivatives, built),
+    "centre_of_mass": lambda built: built.centroid.position,
+    "centre_of_mass_jacobian": lambda built: built.centroid.jacobian,
+    "centre_of_mass_jacobian_rate": lambda built: built.centroid.jacobian_rate,
+    "centroidal_momentum_matrix": lambda built: built.centroid.momentum_matrix,
     "regressor": _regressor,
     "placement": _placement,
     "jacobian": _jacobian,

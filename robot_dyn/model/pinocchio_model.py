@@ -20,6 +20,7 @@ from robot_dyn.description.inertial_parameters import NAMES, ordered
 from robot_dyn.description.structure import stated_mimics
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import DescriptionError, EditError, nearest
+from robot_dyn.model.centroid import Centroid
 from robot_dyn.model.coriolis import Coriolis
 
 MAX_MOVING = 250  # Pinocchio's working memory for n joints is 63 n³ bytes: 1 GB at this limit
@@ -47,6 +48,11 @@ class Built:
     def coriolis(self) -> Coriolis:
         """Coriolis matrix of `model`, with the bound on its rounding error."""
         return Coriolis.from_model(self.model, self.couplings)
+
+    @cached_property
+    def centroid(self) -> Centroid:
+        """Centre of mass and centroidal momentum of `model`."""
+        return Centroid.from_model(self.model, self.coriolis.bodies)
 
     @cached_property
     def sizes(self) -> Mapping[str, int]:

@@ -10,15 +10,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array, rounding
+from robot_dyn.foundations.arithmetic import FLOAT64, Array, rounding
 from robot_dyn.foundations.errors import OverflowedError, SingularError, UndecidedError, shown
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.foundations.names_nearest import NamesNearest
-from robot_dyn.foundations.validate import JointValues, choice
+from robot_dyn.foundations.validate import JointValues, check_batches, choice, shaped
+from robot_dyn.queries.batch import into
 from robot_dyn.queries.quantity import DOUBTFUL, Quantity, query, table
 
 T = TypeVar("T")
@@ -168,15 +169,59 @@ class Dynamics(NamesNearest, ABC, Generic[Answer]):
         """Generalised momentum p = ∂K/∂v = M v."""
         return self._answer("momentum", (q, v), out)
 
+    @query(3, "n", "n", unit="N m by rad, rad/s, rad/s²", terms=lambda size, x: size.derivatives(x["v"], x["a"]))
+    def inverse_dynamics_derivatives(
+        self, q: JointValues, v: JointValues, a: JointValues, *, out: Answer | None = None
+    ) -> Answer:
+        """Derivatives of inverse dynamics τ = M a + C v + N: ∂τ/∂q, ∂τ/∂v = 2 C and ∂τ/∂a = M, in this order."""
+        return self._answer("inverse_dynamics_derivatives", (q, v, a), out)
+
+    @query(3, unit="m", terms=lambda size, x: np.full(3, size.moment / size.mass))
+    def centre_of_mass(self, q: JointValues, *, out: Answer | None = None) -> Answer:
+        """Centre of mass of the moving bodies, in base axes."""
+        return self._answer("centre_of_mass", (q,), out)
+
+    @query(3, "n", unit="m/s by v", terms=lambda size, x: np.tile(size.carried / size.mass, (3, 1)))
+    def centre_of_mass_jacobian(self, q: JointValues, *, out: Answer | None = None) -> Answer:
+        """Jacobian of the centre of mass, ċ = J v, in base axes."""
+        return self._answer("centre_of_mass_jacobian", (q,), out)
+
+    @query(3, "n", unit="m/s² by v", terms=lambda size, x: np.tile(size.carried_rate(x["v"]) / size.mass, (3, 1)))
+    def centre_of_mass_jacobian_rate(self, q: JointValues, v: JointValues, *, out: Answer | None = None) -> Answer:
+        """Rate of change dJ/dt of the Jacobian of the centre of mass, along v."""
+        return self._answer("centre_of_mass_jacobian_rate", (q, v), out)
+
+    @query(6, "n", unit="kg m/s and kg m²/s by v", terms=lambda size, x: size.momentum_matrix())
+    def centroidal_momentum_matrix(self, q: JointValues, *, out: Answer | None = None) -> Answer:
+        """Centroidal momentum matrix A_G of the moving bodies: momentum (linear, angular) = A_G v about their centre.
+
+        In base axes. Its linear part is m ċ; armature does not count. [Orin, Goswami, Lee 2013]
+        """
+        return self._answer("centroidal_momentum_matrix", (q,), out)
+
     @query("n", "p", unit="N m by parameter", terms=lambda size, x: size.regressor(x["v"], x["a"]))
-    def regressor(self, q: JointValues, v: JointValues, a: JointValues, *, out: Answer | None = None) -> Answer:
+    def regressor(
+        self, q: JointValues, v: JointValues, a: JointValues, v_r: JointValues | None = None,
+        *, out: Answer | None = None,
+    ) -> Answer:  # fmt: skip
         """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
+
+        With a reference velocity v_r and a its acceleration: Y θ = M a + C(q, v) v_r + N − armature · a, as
+        adaptive controllers need it. C is linear in v, so that this is Y(½(v + v_r), a) − Y(½(v − v_r), 0) + Y(0, 0).
 
         Y depends on geometry, gravity and couplings, but not on masses: θ can be identified from measured torques,
         except for combinations that no motion distinguishes, for which Y is rank-deficient.
-        [Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2]
+        [Atkeson, An, Hollerbach 1986; Slotine, Li 1987; Siciliano et al. 2009, §7.2.2]
         """
-        return self._answer("regressor", (q, v, a), out)
+        if v_r is None:
+            return self._answer("regressor", (q, v, a), out)
+        arithmetic, Y = getattr(self, "arithmetic", FLOAT64), cast(Any, self.regressor)
+        velocities = {name: shaped(name, x, self.joint_names, arithmetic) for name, x in (("v", v), ("v_r", v_r))}
+        check_batches(**velocities)
+        with arithmetic.scope():
+            mean, half = sum(velocities.values()) / 2, (velocities["v"] - velocities["v_r"]) / 2
+            zero = 0 * half
+            return into(out, Y(q, mean, a) - Y(q, half, zero) + Y(q, zero, zero))
 
     @query(4, 4, unit="1 and m", terms=_placement_terms)
     def placement(self, q: JointValues, frame: str, *, out: Answer | None = None) -> Answer:

@@ -25,6 +25,7 @@ _PARAMETERS = {
     "q": "Positions, shape (..., n), in [rad] or [m] by joint.",
     "v": "Velocities, shape (..., n), in [rad/s] or [m/s].",
     "a": "Accelerations, shape (..., n), in [rad/s²] or [m/s²].",
+    "v_r": "Reference velocities, shape (..., n), in [rad/s] or [m/s]; v by default.",
     "tau": "Torques, shape (..., n), in [N m] or [N].",
     "frame": "Name of a link, or of a joint, whose frame is that of its child link. A shared name means the link.",
     "expressed_in": """Axes and point of the twist: "world_aligned" (at the frame's origin, along the base's axes),

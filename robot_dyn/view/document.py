@@ -5,7 +5,7 @@ The first run is drawn opaque, the others as ghosts. Problems list parts that di
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, final
@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.description.packages import searched
-from robot_dyn.foundations.errors import QueryError, shorten
+from robot_dyn.foundations.errors import QueryError, shorten, shown
 from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.foundations.validate import instance, one_state, truth
 from robot_dyn.model.robot import Robot
@@ -72,19 +72,19 @@ class Shown:
 @np.errstate(all="ignore")  # huge positions are drawn as far as possible
 def document_of(
     runs: tuple[TrajectoryData, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
-    meshes: str = "full",
+    meshes: str = "full", names: Sequence[str] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Return the document of runs; for arguments, see `replay`.
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If it carries no robot, or no robot has the frame.
+        QueryError: If it carries no robot, or no robot has the frame, or the names are not one text for each run.
     """
     for run in runs:
         instance("run", run, TrajectoryData, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     instance("frame", frame, str | None, "give the name of a link, or None")
-    names = run_names(*runs)
+    names = run_names(*runs) if names is None else _checked_names(names, len(runs))
     shown = [_shown(number, run, names, package_dirs, inertia, meshes) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in item.stage.linkage.links for item in shown):
         shown[0].stage.link_path(frame)  # raises, with the nearest names
@@ -197,6 +197,15 @@ class _Document:
         }
 
 
+def _checked_names(names: object, count: int) -> tuple[str, ...]:
+    """Return the names of runs; raise a QueryError if they are not distinct texts, one for each run."""
+    if isinstance(names, list | tuple):
+        texts = tuple(dict.fromkeys(name for name in names if isinstance(name, str) and name.strip()))
+        if len(texts) == len(names) == count:
+            return texts
+    raise QueryError(f"names must be {count} different texts, one for each run, got {shown(names)}")
+
+
 def _outcome(shown: Shown) -> str:
     end = shown.run.outcome
     return f"{shown.prefix}{end.ending} at t = {end.t:g} s" + (f": {end.text}" if end.text else "")
@@ -220,7 +229,7 @@ def _shown(
         raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is not a link of its robot; simulate again")
     motion = motion_of(run)
     keys = keyframes(motion.t, stage.linkage.couplings.position(motion.q))
-    name = names[number] if len(names) > 1 else robot.name
+    name = names[number]
     prefix = f"{name}: " if len(names) > 1 else ""
     return Shown(name, prefix, run, stage, motion, keys, look_of(robot, dirs, inertia, meshes), whole - len(run.t))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,6 +22,7 @@ def replay(
     frame: str | None = None,
     inertia: bool = False,
     meshes: Literal["full", "coarse"] = "full",
+    names: Sequence[str] | None = None,
 ) -> Page:
     """Show runs: in a notebook where they stand last in a cell, elsewhere in the browser, at the `address` of the page.
 
@@ -34,12 +35,14 @@ def replay(
         frame: Link whose path is traced.
         inertia: True to draw each link's equivalent box, of the same mass and inertia.
         meshes: "full", the triangles of their files; or "coarse", fewer, for a smaller page.
+        names: Names of the runs in titles and legends; by default robots, files or settings that differ.
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If a run carries no robot, or `frame` is not one of its links.
+        QueryError: If a run carries no robot, `frame` is not one of its links, or `names` are not different texts, one
+            for each run.
     """
-    return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes))
+    return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes, names))
 
 
 def show(

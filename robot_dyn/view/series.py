@@ -31,12 +31,13 @@ _UNSTATED = 1e300  # a limit of this size means none
 
 
 class Curve(NamedTuple):
-    """Values over times t, both (m,), of a run, or of a ghost, whose mark is after the name."""
+    """Values over times t, both (m,), of a run, or of a ghost; the mark after the name is that of the run."""
 
     name: str
     t: np.ndarray
     values: np.ndarray
     mark: str = ""
+    is_ghost: bool = False
     is_desired: bool = False
 
 
@@ -47,14 +48,15 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
     """
     types = {"revolute" if body.revolute else "prismatic" for stage in stages for body in stage.linkage.bodies}
     kind = types.pop() if len(types) == 1 else None
-    marks, robot, first, found = ["", *(f" ({name})" for name in names[1:])], stages[0].robot, runs[0], []
+    marks = [f" ({name})" for name in names] if len(names) > 1 else [""]
+    robot, first, found = stages[0].robot, runs[0], []
 
     efforts = effort_limits(first, robot.effort_limit)
 
     def curves(columns: Iterable[Columns], is_desired: bool = False) -> list[Curve]:
         return [
-            Curve(name, run.t, values, mark, is_desired)
-            for run, mark, of_run in zip(runs, marks, columns, strict=True)
+            Curve(name, run.t, values, mark, number > 0, is_desired)
+            for number, (run, mark, of_run) in enumerate(zip(runs, marks, columns, strict=True))
             for name, values in of_run.items()
         ]
 
@@ -137,16 +139,20 @@ def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q
 
 
 def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
-    """Return a plot of curves at the times that thinning keeps for at least one of them; nan after the end of a run."""
+    """Return a plot of curves at the times that thinning keeps for at least one of them; nan after the end of a run.
+
+    Curves of one name, such as those of a joint in several runs, follow each other, also in the legend.
+    """
     curves = [curve for curve in curves if len(curve.t)]
     t = np.unique(np.concatenate([np.zeros(0), *(curve.t[thinned(curve.values[:, None])] for curve in curves)]))
     colors = {name: index for index, name in enumerate(dict.fromkeys(curve.name for curve in curves))}
+    curves.sort(key=lambda curve: colors[curve.name])
     series = [
         {
             "label": f"{curve.name}{' desired' * curve.is_desired}{curve.mark}",
             "values": np.interp(t, curve.t, np.clip(curve.values, -_MOST, _MOST), right=np.nan).astype(np.float32),
             "color": colors[curve.name],
-            "ghost": curve.mark != "",
+            "ghost": curve.is_ghost,
             "desired": curve.is_desired,
         }
         for curve in curves

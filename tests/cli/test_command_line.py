@@ -206,7 +206,7 @@ def test_every_command_is_in_one_group() -> None:
     for group in GROUPS:
         of_tools = [name in TOOLS for name, (its, _) in commands().items() if its == group]
         assert of_tools == sorted(of_tools) and not all(of_tools)
-    assert len(TOOLS) == len(MODULES) and {*TOOLS} < {*commands()}
+    assert {program().commands[name].callback.__module__ for name in TOOLS} == MODULES and {*TOOLS} < {*commands()}
 
 
 def test_help_has_the_groups_and_a_line_for_each_command() -> None:

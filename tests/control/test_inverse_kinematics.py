@@ -242,6 +242,7 @@ def test_answers_repeat() -> None:
         ({"pose": 2 * np.eye(4)}, PlanError, "its last row must be 0 0 0 1"),
         ({"pose": ([0, 0, 0.5], 1.001 * np.eye(3))}, PlanError, r"RᵀR differs from 1 by 0\.002"),
         ({"pose": ([0, 0, 0.5], -np.eye(3))}, PlanError, "its determinant is −1"),
+        ({"pose": [0, 0, 0.5]}, PlanError, r"not a pair \(position, rotation or None\) must have shape \(4, 4\)"),
         ({"pose": ([0, 0, 0.5], [0, 0, 0])}, PlanError, "the direction of the pose must not be zero"),
         ({"pose": ([0, 0, 0.5], [0, 0, 1]), "tool_axis": np.zeros(3)}, PlanError, "tool_axis must not be zero"),
         ({"pose": ([0, 0, 0.5], [0, 1])}, PlanError, r"the rotation of the pose .* \(3, 3\) or \(3,\)"),

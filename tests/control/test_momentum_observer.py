@@ -153,6 +153,13 @@ def test_the_interval_contains_the_alarm_rate_of_fresh_logs(wanted: float | None
     assert missed <= 10
 
 
+def test_a_log_has_the_contacts_of_its_own_threshold_where_it_exceeds_it() -> None:
+    """The largest value is the threshold, and nothing exceeds it; one block exceeds the second largest."""
+    log = noisy(60, 1)
+    assert log.contacts(log.threshold()) == ()
+    assert log.contacts(log.threshold(600.0))
+
+
 def test_the_interval_is_that_of_order_statistics() -> None:
     """The upper end is the quantile of Beta(k + 1, B − k) exactly, the lower end is at most its other quantile."""
     log = noisy(60, 1)
@@ -191,6 +198,7 @@ LOG = dict(zip(("t", "q", "v", "tau"), smooth_log(m=11), strict=True))
         ({"v": LOG["v"][1:]}, r"v must .* \(11, 2\)"),
         ({"bandwidth_rad_s": 0.0}, "bandwidth_rad_s must be above 0|bandwidth_rad_s"),
         ({"effects": 3.0}, "effects"),
+        ({"effects": lambda q, v: -v[0]}, r"effects\(q, v\) must have shape \(11, 2\)"),
         ({"held": 1}, "held"),
         ({"rest_s": (5.0, 6.0)}, "rest_s: 0 samples"),
         ({"rest_s": (0.0, 2.0)}, "rest_s: a joint moves by"),

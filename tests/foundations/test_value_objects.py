@@ -99,6 +99,7 @@ def values() -> dict[str, Any]:
         rd.tools.proof.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup),
         rd.accuracy.Cost("arm", (), (), (), {}, 1.0, 1.0),
         rd.accuracy.certify(rd.load("pendulum"), samples=100, repeats=1), rd.tools.doctor.check_urdf("pendulum"),
+        rd.tools.doctor.diff_robots(ARM, ARM.with_(mass_scale=1.1), samples=3),
         (swept := sweep_of_pendulum()), swept.sweep, rd.tools.motors.budget(PLAN, plant, effort=9.0, velocity=9.0),
         (stressed := short_stress(rd.load("pendulum"))), stressed.worst[0], rd.diff_runs(run, run),
         rd.control.inverse_kinematics(ARM, ARM.placement(Q, "tip"), frame="tip", starts=2),

@@ -16,7 +16,7 @@ from robot_dyn.lagrange import floored, magnitudes, scaled
 from tests.chains import body, chain
 from tests.queries import ARGUMENTS, FRAMED, general
 
-FAR = {"potential_energy", "placement"}  # have the distance in them by definition
+FAR = {"potential_energy", "placement", "centre_of_mass"}  # have the distance in them by definition
 BASES = ("1000 -300 200", "4e5 -9e5 3e5", "5e5 5e6 -1e6")  # in [m]
 COM, JOINT = (0.4, 0.1, -0.2), (1.0, -0.3, 0.1)  # of a link, and of the next joint, in its length
 AXES = ("0.3 0.2 1", "1 0.1 -0.4", "0.2 1 0.3", "-0.4 0.3 1")

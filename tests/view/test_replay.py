@@ -11,7 +11,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.description import structure_of
+from robot_dyn.foundations import QueryError
 from robot_dyn.queries import format_duration
+from robot_dyn.view import document_of
 from tests.browser import opened, until
 from tests.command import run as command
 
@@ -175,6 +177,24 @@ def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path
         labels = view.ask("[...document.querySelectorAll('.plot')].map(p => p.textContent)")
         name = rd.diff_runs(fall, other).names[1]
         assert all("elbow_joint" in text and f"elbow_joint ({name})" in text for text in labels[:2])
+
+
+def test_runs_have_the_names_of_the_user_and_the_curves_of_a_joint_follow_each_other() -> None:
+    arm = rd.load("planar_2r")
+    runs = [
+        rd.simulate(arm, [q, 0.1], duration_s=0.05, method="RK4", step_s=0.01, estimate_error=False) for q in (0.2, 0.3)
+    ]
+    document = document_of((*runs,), (), None, False, names=["before", "after"])
+    positions = document["plots"][0]["series"]
+    assert [series["label"] for series in positions] == [
+        f"{joint} ({name})" for joint in arm.joint_names for name in ("before", "after")
+    ]
+    assert [series["ghost"] for series in positions] == [False, True] * arm.n
+    assert [float(series["values"][0]) for series in positions[:2]] == pytest.approx([0.2, 0.3], rel=1e-6)  # float32
+    assert "before / after" in document["title"]
+    for wrong in (["before"], ["a", "a"], ["a", " "], "ab", [1, 2]):
+        with pytest.raises(QueryError):
+            document_of((*runs,), (), None, False, names=wrong)  # pyright: ignore[reportArgumentType]
 
 
 def test_names_of_a_file_are_text_and_no_code(browser) -> None:

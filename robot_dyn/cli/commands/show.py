@@ -103,6 +103,7 @@ def replay(
     size: str | None = None,
     dark: Dark = False,
     frame: str | None = None,
+    name: list[str] | None = None,
     view: PageOptions = SERVED,
     package_dir: list[str] | None = None,
 ) -> None:
@@ -116,6 +117,7 @@ def replay(
         fps: Frames per second of the video; frame k shows t = k / fps. Default 60, or 25 for a .gif.
         size (WIDTHxHEIGHT): Pixels of the video; 1280x720 by default.
         frame (LINK): Link whose path is drawn; the tip by default.
+        name: Name of a run in titles and legends, one for each run; repeat it.
         package_dir: Folder in which ROS packages are searched; may be repeated.
     """
     file = view.file(runs)
@@ -125,7 +127,8 @@ def replay(
             "--dark, --size and --fps apply to a video only; add --video OUT.mp4, or remove them: a page follows the"
             " dark mode of the browser"
         )
-    page = rd.replay(*map(arguments.run, runs), frame=frame, package_dirs=package_dir or (), **view.appearance)
+    trajectories = map(arguments.run, runs)
+    page = rd.replay(*trajectories, frame=frame, names=name, package_dirs=package_dir or (), **view.appearance)
     if film is None:
         view.write_or_serve(page, file, "run")
         return

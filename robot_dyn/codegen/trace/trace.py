@@ -159,6 +159,7 @@ class Trace:
                 self._mass, tau - newton_euler(linkage, q, v, zero), self.lagrangian.joint_names
             ),
             "C": lambda: christoffel(self._mass_derivative, v),
+            "inverse_dynamics_derivatives": self._inverse_derivatives,
             "regressor": lambda: regressor(self.lagrangian.linkage, q, v, a),  # for the bodies of the file
         }
         if name in formulas:
@@ -212,6 +213,12 @@ class Trace:
     def _forward(self) -> Node:
         (_, q), (_, v), _, (_, tau) = self.symbols.values()
         return column(articulated_body(self.linkage, q, v, tau))
+
+    def _inverse_derivatives(self) -> Array:
+        """Return ∂ID/∂q, ∂ID/∂v, M."""
+        (q, qs), (v, vs), (_, a), _ = self.symbols.values()
+        ID = column(newton_euler(self.linkage, qs, vs, a))
+        return np.stack([array_of(ca.densify(ca.jacobian(ID, x))) for x in (q, v)] + [self._mass])
 
     def _derivatives(self) -> Node:
         """Return ∂a/∂x = −M⁻¹ ∂ID/∂x at a = FD(q, v, τ), and ∂a/∂τ = M⁻¹."""

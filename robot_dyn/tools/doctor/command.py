@@ -1,9 +1,10 @@
-"""The command that checks URDF files: check-urdf."""
+"""The commands about files of robots: check-urdf and diff-robots."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,9 +12,22 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.cli import FILE_AS_STATED, FileOptions, Force, Json, command, completion, progress, show, to_stderr
+from robot_dyn.cli import (
+    AS_STATED,
+    FILE_AS_STATED,
+    FileOptions,
+    Force,
+    Json,
+    RobotOptions,
+    arguments,
+    command,
+    completion,
+    progress,
+    show,
+    to_stderr,
+)
 from robot_dyn.description import package_folders
-from robot_dyn.foundations import FileKind, QueryError, save, target
+from robot_dyn.foundations import FileKind, QueryError, nearest, save, shown, target
 from robot_dyn.tools.doctor.kinds import FindingKind
 
 if TYPE_CHECKING:
@@ -87,6 +101,60 @@ def check_urdf(
                 to_stderr(f"{file}: nothing to repair{hint}")
     remaining = (finding for file, x, _ in checked for finding in (x.left if file in written else x.findings))
     if any(finding.severity is Severity.ERROR for finding in remaining):
+        raise typer.Exit(1)
+
+
+@command("Files")
+def diff_robots(
+    a: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    b: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    /,
+    joint: list[str] | None = None,
+    sign: list[str] | None = None,
+    offset: list[str] | None = None,
+    tolerance: float = 0.01,
+    samples: int = 1000,
+    options: RobotOptions = AS_STATED,
+    as_json: Json = False,
+) -> None:
+    """Compare two files of one robot: their values, in N m too.
+
+    It prints the map q_b = s q_a + o, the values that differ, and the largest differences found of N and M. The exit
+    code is 1 if these exceed the tolerance, or if a joint has no counterpart. --lock applies to each file that has the
+    joint, --xacro to xacro files.
+
+    Options:
+        a (A): A name of `robot-dyn list`, or the path of a URDF, MJCF or xacro file.
+        b (B): Another description of the same robot.
+        joint (A=B): Joint of A and its counterpart in B, where the names differ; may be repeated.
+        sign (JOINT=S): Sign s of a joint of A, 1 or -1; may be repeated.
+        offset (JOINT=VALUE): Offset o of a joint of A, in rad or m; may be repeated.
+        tolerance: Largest accepted difference of N, in N m or N, and of M at 1 rad/s² or 1 m/s².
+        samples (COUNT): Number of random states from which the search starts.
+    """
+    locks = arguments.assignments("--lock", options.lock) if options.lock else {}
+    robots = []
+    for name in (a, b):
+        expanded = options.xacro if name.endswith(".xacro") else None
+        robots.append(replace(options, lock=None, xacro=expanded).load(name))
+    joints = {name for robot in robots for name in robot.description.joint_kinds}
+    for name in locks:
+        if name not in joints:
+            raise QueryError(f"--lock: no joint {shown(name)} in either file; {nearest(name, joints)}")
+    locked = (
+        robot.with_(lock={name: q for name, q in locks.items() if name in robot.description.joint_kinds})
+        for robot in robots
+    )
+    difference = rd.tools.doctor.diff_robots(
+        *locked,
+        joints=arguments.pairs("--joint", joint, "A=B"),
+        signs=arguments.assignments("--sign", sign or []),
+        offsets=arguments.assignments("--offset", offset or []),
+        tolerance=tolerance,
+        samples=samples,
+    )
+    show(difference, as_json=as_json)
+    if not difference.agrees:
         raise typer.Exit(1)
 
 

@@ -1,0 +1,372 @@
+"""Difference of two descriptions of one robot: in bodies, axes and limits, and its effect on N and M."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import degrees, pi
+from pathlib import Path
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from robot_dyn import Lagrangian, Robot
+from robot_dyn.description import catalog, structure_of
+from robot_dyn.foundations import (
+    Answer,
+    Block,
+    QueryError,
+    Table,
+    first_moment,
+    hat,
+    instance,
+    integer,
+    number,
+    number_or_dash,
+    reported,
+    shown,
+)
+from robot_dyn.queries import of_joint, unit
+from robot_dyn.tools.doctor.coordinate_map import Basis, JointMap, Laid, Obstacle, Unmapped, laid_bodies, matched_names
+from robot_dyn.tools.doctor.largest_difference import LargestDifference, MappedPair, largest_differences, mapped_pair
+
+_DIFFERENT = 1e-5  # of the size of a value: rounded angles such as 1.5708 cause smaller differences
+_LISTED = 4  # bodies, and joints without counterpart, that are printed
+_REMEDIES = {
+    Obstacle.MISSING: "name the counterpart (joints=, --joint A=B), or lock it (with_(lock=…), --lock NAME=0)",
+    Obstacle.TYPE: "correct the type in one file, or name another counterpart with joints=",
+    Obstacle.CARRIER: "name counterparts with joints=, or lock the joints in between",
+    Obstacle.COUPLED: "lock it in both, or correct its <mimic>",
+    Obstacle.AXIS: "correct the axis or origin in one file, or state the sign and offset of the joints before it",
+}
+
+
+@final
+@dataclass(frozen=True)
+class Difference:
+    """A value that differs between two descriptions.
+
+    Attributes:
+        joint: Joint of a whose axis, limits or body differ; empty for the whole robot.
+        quantity: Name of the value. Mass, centre and moments are those of the joint's body: all links without relative
+            motion. Centre and moments are in the joint's frame of a, moments about the centre of mass.
+        unit: Its unit.
+        a, b: Components of the value; those of b are converted to the coordinates and axes of a. Empty if absent.
+    """
+
+    joint: str
+    quantity: str
+    unit: str
+    a: tuple[float, ...]
+    b: tuple[float, ...]
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotDifference(Answer):
+    """The difference of two descriptions of one robot.
+
+    Attributes:
+        names: Names of the two descriptions.
+        sources: Their files.
+        joints: The map q_b = s q_a + o, by joint.
+        unmapped: Joints that prevent a comparison of torques; then `largest` is empty.
+        differences: Values that differ by more than 1e-5 of their size.
+        order: Joint names of q_a and of q_b, each in the names of a, if their order differs; otherwise empty.
+        largest: Largest differences found of N and of M, by joint.
+        tolerance: Largest accepted difference, in [N m] or [N]; entries of M are multiplied by 1 rad/s² or 1 m/s².
+        samples: Number of random states of the search.
+    """
+
+    names: tuple[str, str]
+    sources: tuple[str, str]
+    joints: tuple[JointMap, ...]
+    unmapped: tuple[Unmapped, ...]
+    differences: tuple[Difference, ...]
+    order: tuple[tuple[str, ...], ...]
+    largest: tuple[LargestDifference, ...]
+    tolerance: float
+    samples: int
+
+    @reported
+    def agrees(self) -> bool:
+        """True if no difference found of N or M exceeds the tolerance, and every joint has a counterpart."""
+        return not self.unmapped and all(abs(row.difference) <= self.tolerance for row in self.largest)
+
+    @property
+    def worst(self) -> LargestDifference | None:
+        """The largest difference found of N; None without a map of all joints."""
+        rows = [row for row in self.largest if row.quantity == "N"]
+        return max(rows, key=lambda row: abs(row.difference), default=None)
+
+    @property
+    def sentence(self) -> str:
+        """The result in one sentence."""
+        a, b = self.names
+        if self.unmapped:
+            groups = dict.fromkeys((x.file, x.obstacle) for x in self.unmapped)
+            return f"no torques of {a} and {b} are compared: {'; '.join(self._unmapped(*group) for group in groups)}"
+        row = self.worst
+        if row is None or row.difference == 0:
+            return f"{a} and {b} need the same torques at rest: no difference of N found"
+        return (
+            f"{a} and {b} {'agree' if self.agrees else 'differ'}: the largest difference found of N, the torques at"
+            f" rest, is {abs(row.difference):.3g} {row.unit} at {row.joint}{_of_effort(row)}"
+        )
+
+    def blocks(self) -> Iterator[Block]:
+        a, b = self.names
+        yield self.sentence
+        yield ""
+        yield from (f"{name}: {source}" for name, source in zip(self.names, self.sources, strict=True))
+        yield ""
+        yield from self._map()
+        if self.order:
+            yield ""
+            yield f"the order of q differs: {', '.join(self.order[0])} in {a}; {', '.join(self.order[1])} in {b}"
+        yield ""
+        if self.differences:
+            yield "values that differ, in the coordinates and joint frames of " + f"{a}:"
+            rows = tuple(
+                (x.joint or "(robot)", x.quantity + f" [{x.unit}]" * bool(x.unit), _numbers(x.a), _numbers(x.b))
+                for x in self.differences
+            )
+            yield Table(("joint", "value", a, b), rows, right=(a, b))
+        else:
+            yield "no masses, centres, moments, axes or limits differ"
+        if self.largest:
+            yield ""
+            yield from self._cost()
+
+    def _unmapped(self, file: str, obstacle: Obstacle) -> str:
+        """Return the unmapped joints of a file with one obstacle, and the remedy."""
+        own, other = self.names[:: 1 if file == "a" else -1]
+        joints = [x.joint for x in self.unmapped if (x.file, x.obstacle) == (file, obstacle)]
+        listed = ", ".join(joints[:_LISTED]) + f", … ({len(joints)} in all)" * (len(joints) > _LISTED)
+        where = f" in {other}" if obstacle is Obstacle.MISSING else ""
+        return f"{listed} of {own}: {obstacle}{where}; {_REMEDIES[obstacle]}"
+
+    def _map(self) -> Iterator[Block]:
+        a, b = self.names
+        changed = [x for x in self.joints if (x.a, x.sign, x.offset) != (x.b, 1, 0.0) or x.basis is Basis.GIVEN]
+        if not changed:
+            yield "map of coordinates: q_b = q_a at all joints, from names and axes"
+            return
+        yield "map of coordinates q_b = s q_a + o, with b: " + f"{b}; override it with signs= and offsets=:"
+        rows = tuple((x.a, x.b, f"{x.sign:+d}", _offset(x.offset), x.basis.value) for x in self.joints)
+        yield Table(
+            (f"joint of {a}", f"joint of {b}", "s", "o [rad] or [m]", "from"), rows, right=("s", "o [rad] or [m]")
+        )
+
+    def _cost(self) -> Iterator[Block]:
+        a, b = self.names
+        yield f"largest differences found, |{b} − {a}|, from {self.samples} random states and local ascent:"
+        M = {row.joint: row for row in self.largest if row.quantity == "M"}
+        rows = tuple(
+            (row.joint, f"{abs(row.difference):.3g} {row.unit}", _percent(row.effort_fraction),
+             f"{abs((m := M[row.joint]).difference):.3g} {m.unit}", m.column if m.difference else "")
+            for row in self.largest if row.quantity == "N"
+        )  # fmt: skip
+        yield Table(
+            ("joint", "N", "of its effort limit", "M", "column of M"), rows, right=("N", "of its effort limit", "M")
+        )
+        for row in (self.worst, max(M.values(), key=lambda row: abs(row.difference), default=None)):
+            if row is not None and row.difference:
+                entry = row.joint if row.quantity == "N" else f"{row.joint}, {row.column}"
+                yield ""
+                yield (
+                    f"{row.quantity} at {entry}: {row.a:.4g} {row.unit} in {a}, {row.b:.4g} {row.unit} in {b}, at q ="
+                    f" {', '.join(f'{round(x, 3) + 0.0:g}' for x in row.q)}"
+                )
+                listed = ", ".join(f"{share.link} {share.value:+.3g}" for share in row.shares[:_LISTED])
+                rest = sum(share.value for share in row.shares[_LISTED:])
+                others = f", others {rest:+.3g}" if len(row.shares) > _LISTED else ""
+                yield f"  share of each link, with the links fixed to it [{row.unit}]: {listed}{others}"
+
+
+def diff_robots(
+    a: Robot,
+    b: Robot,
+    *,
+    joints: Mapping[str, str] | None = None,
+    signs: Mapping[str, float] | None = None,
+    offsets: Mapping[str, float] | None = None,
+    tolerance: float = 0.01,
+    samples: int = 1000,
+    seed: int = 0,
+) -> RobotDifference:
+    """Compare two descriptions of one robot: their values, and the largest differences of N and M that these cause.
+
+    Joints are matched by name. Signs and zero positions may differ: the map q_b = s q_a + o is proposed from the joint
+    axes. Torques are compared only if all moving joints have a counterpart; `unmapped` lists the others. The largest
+    differences are searched by random states and local ascent within the limits that both files allow: they are lower
+    bounds.
+
+    Args:
+        a: A robot.
+        b: The robot of another file.
+        joints: Joint of b by joint of a, where the names differ.
+        signs: s by joint of a, 1 or −1, where the proposal is wrong.
+        offsets: o by joint of a, in [rad] or [m], where the proposal is wrong.
+        tolerance: Largest accepted difference of N, in [N m] or [N], and of M at 1 rad/s² or 1 m/s².
+        samples: Number of random states.
+        seed: Seed of the random generator.
+
+    Raises:
+        QueryError: If a joint is unknown, a sign is not ±1 or another argument is not allowed.
+
+    Example:
+        >>> import robot_dyn as rd
+        >>> arm = rd.load("planar_2r")
+        >>> rd.tools.doctor.diff_robots(arm, arm).agrees
+        True
+    """
+    for label, robot in (("a", a), ("b", b)):
+        instance(label, robot, Robot, "give a robot, for example rd.load('ur5')")
+    tolerance, samples = number("tolerance", tolerance, least=0), integer("samples", samples, least=1, most=10**6)
+    seed = integer("seed", seed, most=2**128 - 1)
+    given = []
+    for label, values in (("joints", joints), ("signs", signs), ("offsets", offsets)):
+        if not isinstance(values, Mapping | None):
+            raise QueryError(f"{label} must be values by joint of a, such as {{'joint_1': …}}, got {shown(values)}")
+        given.append({} if values is None else values)
+    names = matched_names(a, b, given[0])
+    laid, unmapped = laid_bodies(a, b, names, *given[1:])
+    maps = tuple(body.map for body in laid)
+    largest, order, differences = (), (), [*_of_robot(a, b), *_of_bodies(a, b, laid), *_of_followers(a, b, laid)]
+    if not unmapped:
+        pair = mapped_pair(a, b, maps)
+        differences += _of_coordinates(pair)
+        in_b = tuple(pair.bodies[name] for name in b.joint_names)
+        order = () if in_b == a.joint_names else (a.joint_names, in_b)
+        structure = structure_of(a.description, a.edits)
+        links = {name: joint.child for name, joint in structure.joints.items()}
+        largest = tuple(largest_differences(pair, links, samples, seed))
+    place = {name: i for i, name in enumerate(("", *(x.a for x in maps)))}
+    differences.sort(key=lambda x: place.get(x.joint, len(place)))
+    sources = catalog.abbreviated(a.description.source), catalog.abbreviated(b.description.source)
+    return RobotDifference(
+        names=_labels(a, b),
+        sources=sources,
+        joints=maps,
+        unmapped=unmapped,
+        differences=tuple(differences),
+        order=order,
+        largest=largest,
+        tolerance=tolerance,
+        samples=samples,
+    )
+
+
+def _labels(a: Robot, b: Robot) -> tuple[str, str]:
+    """Return distinct names of the two descriptions: robots, files, or a and b."""
+    stems = [Path(robot.description.source).name.partition(".")[0] for robot in (a, b)]
+    pairs = ((a.name, b.name), (stems[0], stems[1]), ("a", "b"))
+    return next(pair for pair in pairs if pair[0] != pair[1])
+
+
+def _of_robot(a: Robot, b: Robot) -> Iterator[Difference]:
+    yield from _differing("", "gravity", "m/s²", a.gravity, b.gravity)
+
+
+def _of_bodies(a: Robot, b: Robot, laid: tuple[Laid, ...]) -> Iterator[Difference]:
+    """Yield the differences of axes and of merged bodies."""
+    linkage, other = Lagrangian(a).linkage, Lagrangian(b).linkage
+    length = max((float(np.linalg.norm(body.pose.p)) for body in linkage.bodies), default=0.0) or 1.0
+    for x in laid:
+        name, frame = x.map.a, x.a
+        if x.turn > _DIFFERENT:
+            yield Difference(name, "direction of the axis, turned by", "deg", (0.0,), (degrees(x.turn),))
+        if (shift := float(np.linalg.norm(x.shift))) > _DIFFERENT * length:
+            yield Difference(name, "place of the axis, moved by", "m", (0.0,), (shift,))
+        (m, c, moments), (m_b, c_b, moments_b) = _body(linkage.inertias[x.i]), _body(other.inertias[x.k])
+        R = frame.R.T @ x.b.R
+        c_b = R @ c_b + frame.R.T @ (x.b.p - frame.p)
+        moments_b = R @ moments_b @ R.T
+        yield from _differing(name, "mass", "kg", [m], [m_b])
+        if m > 0 and m_b > 0:
+            yield from _differing(name, "centre of mass x, y, z", "m", c, c_b, length)
+        size = float(max(np.trace(moments), np.trace(moments_b)))
+        yield from _differing(name, "moments Ixx, Iyy, Izz", "kg m²", np.diag(moments), np.diag(moments_b), size)
+        products = np.triu_indices(3, 1)
+        yield from _differing(name, "products Ixy, Ixz, Iyz", "kg m²", moments[products], moments_b[products], size)
+
+
+def _of_followers(a: Robot, b: Robot, laid: tuple[Laid, ...]) -> Iterator[Difference]:
+    """Yield the differences of q_follower = ratio · q + offset of a, and the followers that only one file has."""
+    of_a, of_b = ({x.joint: row for x, *row in zip(y.bodies, y.couplings.S, y.couplings.s0, strict=True)}
+                  for y in (Lagrangian(a).linkage, Lagrangian(b).linkage))  # fmt: skip
+    maps = {x.map.a: x.map for x in laid}
+    quantity, matched = "ratio and offset to the joint it follows", {x.b for x in maps.values()}
+    for name in sorted(of_a.keys() - {*a.joint_names}):
+        row, offset = of_a[name]
+        source = int(np.argmax(row != 0))
+        value: tuple[float, ...] = ()
+        if name in maps and a.joint_names[source] in maps:
+            own, free = maps[name], maps[a.joint_names[source]]
+            row_b, offset_b = of_b[own.b]
+            ratio = float(row_b[b.joint_names.index(free.b)])
+            value = own.sign * ratio * free.sign, own.sign * (ratio * free.offset + float(offset_b) - own.offset)
+            yield from _differing(name, quantity, "", [row[source], offset], value, 1.0)
+        else:
+            yield Difference(name, quantity, "", (float(row[source]), float(offset)), ())
+    for name in sorted(of_b.keys() - {*b.joint_names} - matched):
+        row, offset = of_b[name]
+        yield Difference("", f"follower {name}, ratio and offset", "", (), (float(row[row != 0][0]), float(offset)))
+
+
+def _body(inertia: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return mass, centre of mass and moments about it of a spatial inertia (6, 6)."""
+    m = float(inertia[0, 0])
+    c = first_moment(inertia) / m if m > 0 else np.zeros(3)
+    return m, c, inertia[3:, 3:] + m * hat(c) @ hat(c)
+
+
+def _of_coordinates(pair: MappedPair) -> Iterator[Difference]:
+    """Yield the differences of limits, friction and armature."""
+    a, b, order = pair.a, pair.b, pair.order
+    low, high = pair.limits_of_b()
+    for j, (name, kind) in enumerate(zip(a.joint_names, a.joint_types, strict=True)):
+        limits = (a.lower[j], a.upper[j]), (low[j], high[j])
+        yield from _differing(name, "position limits", unit("q", kind), *limits, pi)
+        for quantity, symbol, x, y in (
+            ("effort limit", "N m", a.effort_limit, b.effort_limit),
+            ("velocity limit", "rad/s", a.velocity_limit, b.velocity_limit),
+            ("viscous friction", "N m s/rad", a.damping, b.damping),
+            ("dry friction", "N m", a.friction, b.friction),
+            ("armature", "kg m²", a.armature, b.armature),
+        ):
+            yield from _differing(name, quantity, of_joint(symbol, kind), [x[j]], [y[order[j]]])
+
+
+def _differing(
+    joint: str, quantity: str, unit: str, a: ArrayLike, b: ArrayLike, size: float = 0.0
+) -> Iterator[Difference]:
+    """Yield the difference of two values if it exceeds a fraction of their size."""
+    x, y = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    equal = x == y  # infinite limits
+    scale = max(size, *np.abs(np.where(equal, 0.0, x)), *np.abs(np.where(equal, 0.0, y)))
+    change = np.abs(np.where(equal, 0.0, x) - np.where(equal, 0.0, y))
+    if np.any(change > _DIFFERENT * (scale if np.isfinite(scale) else 1.0)):
+        tiny = 1e-12 * (scale if np.isfinite(scale) else 1.0)
+        rounded = (tuple(0.0 if abs(value) <= tiny else float(value) for value in values) for values in (x, y))
+        yield Difference(joint, quantity, unit, *rounded)
+
+
+def _of_effort(row: LargestDifference) -> str:
+    return f" ({_percent(row.effort_fraction)} of its effort limit)" if np.isfinite(row.effort_fraction) else ""
+
+
+def _percent(fraction: float) -> str:
+    return f"{100 * fraction:.2g} %" if np.isfinite(fraction) else "—"
+
+
+def _offset(offset: float) -> str:
+    turns = offset / (pi / 4)
+    exact = {-3: "−3π/4", -2: "−π/2", -1: "−π/4", 1: "π/4", 2: "π/2", 3: "3π/4", 4: "π"}
+    return exact[round(turns)] if round(turns) in exact and abs(turns - round(turns)) < 1e-9 else f"{offset:.6g}"
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return ", ".join(number_or_dash(x + 0.0, 4) for x in values) or "absent"
