@@ -112,9 +112,8 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
     """
     signals, rows, n = found.signals, found.rows, model.arm.n
     arm, state = model.arm.with_(armature=0.0), found.state
-    at_rest = np.concatenate([model.base.R @ arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]])
-    r, own = len(at_rest), np.zeros(len(rows.names))
-    own[:r] = at_rest
+    r, own = len(model.stated), np.zeros(len(rows.names))
+    own[:r] = model.stated
     if friction is not None:
         own[r : r + 2 * n] = friction.ravel()
     shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
