@@ -328,6 +328,7 @@ def test_other_programs_solve_the_same_equation(setup: rd.Setup, first: int) -> 
     peers, _ = methods_of_peers(setup)
     theirs = {each.method: each for each in peers}
     assert {"SciPy DOP853 + pin.aba", "MuJoCo RK4", "MuJoCo Euler", "MuJoCo implicitfast"} <= theirs.keys()
+    assert ("MuJoCo discrete" in theirs) == ("mjINT_DISCRETE" in vars(import_module("mujoco").mjtIntegrator))
     ours = ladder(own(setup, rd.integrate.method("RK4"), "compiled", events=False), truth, first, first + 2)
     same = ladder(theirs["MuJoCo RK4"], truth, first, first + 2)
     for a, b in zip(ours.points, same.points, strict=True):

@@ -24,7 +24,8 @@ _LOOK = {  # theme colour and marker, by family: explicit, Gauss, stiff, adaptiv
 }  # fmt: skip
 _PEERS = {
     "SciPy DOP853 + pin.aba": "x", "SciPy Radau + pin.aba": "+", "SciPy LSODA + pin.aba": "1", "MuJoCo RK4": "D",
-    "MuJoCo Euler": "^", "MuJoCo implicitfast": "v", "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
+    "MuJoCo Euler": "^", "MuJoCo implicitfast": "v", "MuJoCo discrete": "<", "Drake runge_kutta3": "P",
+    "heyoka, Taylor": "*",
 }  # fmt: skip
 _MAX_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
 _MAX_METHODS, _SIX_DIGITS = 8, 1e-6  # in one panel; [rad] or [m]

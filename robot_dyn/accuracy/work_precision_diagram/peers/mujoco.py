@@ -1,4 +1,4 @@
-"""MuJoCo's Euler, implicitfast and RK4 in C, from the same file by its own parser."""
+"""MuJoCo's Euler, implicitfast, discrete (since 4.0) and RK4 in C, from the same file by its own parser."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ if TYPE_CHECKING:
 STEP_S = 1e-3
 _METHODS = {  # name of the option, order, evaluations of the equation of motion per step
     "RK4": ("mjINT_RK4", 4, 4), "Euler": ("mjINT_EULER", 1, 1), "implicitfast": ("mjINT_IMPLICITFAST", 1, 1),
+    "discrete": ("mjINT_DISCRETE", 1, 1),
 }  # fmt: skip
 _IN_C = ViscousFriction, LineSpring, LineDamper
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
-    """Return MuJoCo's three methods; viscous friction, lines and servos run in C, other torques in Python."""
+    """Return MuJoCo's methods; viscous friction, lines and servos run in C, other torques in Python."""
     module: Any = import_module("mujoco")
     robot, setup, servo, effects = motion.robot, motion.setup, motion.servo, motion.setup.plant.effects
     damping: Any = sum((effect.viscous for effect in effects if isinstance(effect, ViscousFriction)), start=0.0)
@@ -95,7 +96,8 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
         steps = partial(step_ladder, period, order)
         return MethodUnderTest(f"MuJoCo {name}", "", motion.events, order, "step", steps, run)
 
-    return [method(name, *details) for name, details in _METHODS.items()]
+    available = vars(module.mjtIntegrator)
+    return [method(name, *details) for name, details in _METHODS.items() if details[0] in available]
 
 
 def mujoco_model(
