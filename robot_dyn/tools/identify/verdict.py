@@ -122,7 +122,8 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
     for *name, columns in _candidates(arm, links, model, rows.Y, own, friction):
         C = columns(*state)
         C = (C if len(C) == len(rows.tau) else signals.second(C)).reshape(rows.tau.size, -1)
-        candidates.append((*name, C[:, np.abs(C).max(axis=0) > _NOTHING]))
+        seen = (np.abs(C).max(axis=0) > _NOTHING) | (name[0] == "load")  # whose first coefficient is its mass
+        candidates.append((*name, C[:, seen]))
     y, used = (shifted - rows.Y @ own).ravel(), rows.used.reshape(-1)
     noise = _noise(
         y, np.column_stack([rows.Y.reshape(len(y), -1), *(C for *_, C in candidates)]), rows.used, found.fit.rms
@@ -142,6 +143,8 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
         fitted, x, covariance = _fitted(np.column_stack([C, nuisance]), y)
         k, chi2 = C.shape[1], float(((y - fitted) ** 2).sum())
         spread = 1.96 * np.sqrt(np.diag(covariance)[:k] * max(chi2 / count, 1.0))
+        if kind == "load" and x[0] <= spread[0]:  # without mass, it stands for another cause
+            continue
         part = (start - chi2) / max(start - full, 1e-300)
         values, widths = (x[:k] * factor)[:_SHOWN], (spread * factor)[:_SHOWN]
         causes.append((chi2, k * np.log(count), (kind, where, values, widths, unit, part)))

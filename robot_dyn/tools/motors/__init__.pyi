@@ -11,7 +11,5 @@ from robot_dyn.tools.motors.planning.path_plan import PathPlan as PathPlan
 
 __all__: list[str]
 
-__all__: list[str]
-
 # Names that only tests import.
 from robot_dyn.tools.motors.torque_speed import TorqueSpeed as TorqueSpeed

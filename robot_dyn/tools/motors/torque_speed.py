@@ -17,6 +17,9 @@ Points = tuple[tuple[float, float], ...]
 """Corners (speed, torque) of a line: the torque is constant below the first speed and above the last one."""
 
 
+_ROUNDING = 1e-12
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class TorqueSpeed:
@@ -53,6 +56,19 @@ class TorqueSpeed:
         """Return ℓ(|v|), (..., n)."""
         columns = zip(np.moveaxis(np.abs(v), -1, 0), self.speed, self.torque, strict=True)
         return np.stack([np.interp(*column) for column in columns], axis=-1)
+
+    @property
+    def hull(self) -> tuple[np.ndarray, np.ndarray]:
+        """Torque at rest and slope, (n, m) each, of straight lines whose minimum is the concave hull; slope 0: none."""
+        starts = np.where(self.exists, self.torque[:, 0], 0.0)[:, None].repeat(len(self.speed.T), axis=1)
+        slopes = np.zeros_like(starts)
+        for i, (x, y) in enumerate(zip(self.speed, self.torque, strict=True)):
+            pairs = [(j, k) for j in range(len(x)) for k in range(j + 1, len(x)) if x[k] > x[j]]
+            lines = [(y[j] - b * x[j], b) for j, k in pairs for b in [(y[k] - y[j]) / (x[k] - x[j])]]
+            above = [(a, b) for a, b in lines if (a + b * x >= y - _ROUNDING * y[0]).all() and b < 0]
+            for m, (a, b) in enumerate(sorted(set(above))[: len(x)]):
+                starts[i, m], slopes[i, m] = a, b
+        return starts, slopes
 
     def used(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the fraction λ of the lines that |τ| at the speed |v| uses, (..., n); 0 without a line."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from robot_dyn.tools.motors import TorqueSpeed
 from tests.effects.test_effect_states import MASS, SLIDER
 
 ARM = rd.load("planar_2r")
+toppra = pytest.mark.skipif(find_spec("toppra") is None, reason="needs toppra")
 FILE = """joint,at,gear_ratio,speed [rad/s],peak [N m],continuous [N m]
 joint_1,motor,50,0,1.2,0.6
 joint_1,,,100,1.2,0.5
@@ -91,6 +93,89 @@ def test_the_budget_of_a_run_at_its_line_uses_all_of_it(tmp_path: Path) -> None:
     joint = rd.tools.motors.budget(run, motors=motors).joints[0]
     assert joint.line["used"] == pytest.approx(1.0, abs=1e-9)
     assert joint.speed == pytest.approx(4 * (1 - np.exp(-6 / MASS / 4)), rel=1e-9)
+
+
+def random_motors(arm: rd.Robot, rng: np.random.Generator) -> Any:
+    """Flat tops and lines from rest, with up to two corners more, concave and convex."""
+    lines = {}
+    for name, effort in zip(arm.joint_names, arm.effort_limit, strict=True):
+        peak, free, more = effort * rng.uniform(0.6, 1.0), 3.15 * rng.uniform(0.6, 1.4), int(rng.integers(0, 3))
+        x = [rng.choice([0.0, rng.uniform(0.1, 0.6)]), *np.sort(rng.uniform(0.65, 0.95, more)), 1.0]
+        y = [1.0, *np.sort(rng.uniform(0.1, 0.95, more))[::-1], 0.0]
+        lines[name] = tuple((float(free * a), float(peak * b)) for a, b in zip(x, y, strict=True))
+    peak, free = ({name: line[i][k] for name, line in lines.items()} for i, k in ((0, 1), (-1, 0)))
+    return rd.tools.motors.Motors(peak=peak, continuous={}, speed=free, armature={}, line=lines)
+
+
+def worst_use(plant: rd.Plant, motion: Any, motors: Any) -> float:
+    """The largest use of torque and speed, by inverse dynamics and np.interp, at 20 000 times.
+
+    The least λ with |τ|/λ ≤ ℓ(|v|/λ) is found by bisection, not by the formula of the library.
+    """
+    t = motion.start_s + (np.arange(20_000) + 0.5) / 20_000 * (motion.end_s - motion.start_s)
+    q, v, a = motion.at(t)
+    tau, most = np.abs(plant.inverse_dynamics(q, v, a, t=0.0)), 0.0
+    drives = plant.inverse_dynamics(q, v, a, t=0.0) * v > 0
+    for i, name in enumerate(plant.dynamics.joint_names):
+        x, y = np.transpose(motors.line[name])
+        most = max(most, (tau[:, i] / y[0]).max(), (np.abs(v[:, i]) / x[-1]).max())
+        w, u = np.abs(v[drives[:, i], i]), tau[drives[:, i], i]
+        low, high = np.zeros(len(u)), np.full(len(u), 10.0)
+        for _ in range(40):
+            middle = (low + high) / 2
+            inside = u <= middle * np.interp(w / middle, x, y)
+            low, high = np.where(inside, low, middle), np.where(inside, middle, high)
+        most = max(most, high.max(initial=0.0))
+    return most
+
+
+@toppra
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(8))
+def test_paths_at_their_limits_keep_random_lines(seed: int) -> None:
+    """Within 1.001 of every line by own inverse dynamics, and at a limit for 98 % of the time."""
+    rng, arm = np.random.default_rng(seed), rd.load("ur5")
+    motors, points = random_motors(arm, rng), rng.uniform(-1.2, 1.2, (int(rng.integers(3, 6)), 6))
+    effects = [rd.effects.ViscousFriction(0.05 * arm.effort_limit / arm.velocity_limit)] * (seed % 2)
+    plan = rd.tools.motors.path(plant := rd.Plant(arm, effects), points, motors=motors)
+    assert worst_use(plant, plan.reference, motors) <= 1.001
+    assert plan.largest <= 1.001 and plan.at_limits >= 0.98
+
+
+@toppra
+def test_a_path_of_one_joint_is_that_of_the_closed_form() -> None:
+    """A mass on P (1 − v/v₀) while driving and −P while braking, from rest to rest: the switch by a root.
+
+    x(t) = v₀ (t − T (1 − exp(−t/T))) with T = m v₀/P, then v²/(2 P/m). Pieces of constant s̈ cost up to 0.3 %,
+    and the tolerance of a limit gains up to 0.1 %.
+    """
+    peak, free, way = 6.0, 4.0, 2.0
+    motors = rd.tools.motors.Motors(
+        peak={"slide": peak}, continuous={}, speed={"slide": free}, armature={},
+        line={"slide": ((0.0, peak), (free, 0.0))},
+    )  # fmt: skip
+    plan = rd.tools.motors.path(SLIDER, [[0.0], [way]], motors=motors)
+    T = MASS * free / peak
+    low, high, t, v = 0.0, 20.0, 0.0, 0.0
+    for _ in range(60):
+        t = (low + high) / 2
+        v = free * (1 - np.exp(-t / T))
+        gone = free * t - T * v + v**2 / (2 * peak / MASS)
+        low, high = (t, high) if gone < way else (low, t)
+    assert 0.999 <= plan.duration_s / (t + v / (peak / MASS)) <= 1.003
+
+
+@toppra
+def test_the_fastest_motion_keeps_lines(motors: Any) -> None:
+    """The same path faster, within its lines and continuous torques; another fraction takes longer."""
+    motors = replace(motors, continuous={}, continuous_line={})
+    slow = rd.control.quintic([0.1, 0.4], [1.2, -0.9], 2.5)
+    budget = rd.tools.motors.budget(slow, ARM, motors=motors)
+    fast = rd.tools.motors.fastest(budget)
+    assert fast.budget.fits and fast.duration_s < 2.5
+    assert worst_use(rd.Plant(ARM), fast.plan.reference, motors) <= 1.001
+    assert max(x.line["used"] for x in fast.budget.joints) > 0.99
+    assert rd.tools.motors.fastest(budget, 0.8).duration_s > fast.duration_s
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from robot_dyn.effects import EffortLimit
 from robot_dyn.foundations import PlanError, QueryError, instance, shown
 from robot_dyn.report import processor_and_versions
 from robot_dyn.simulation import Ending, RemarkKind, remark_lines, robot_of
-from robot_dyn.tools.motors.limits import check_motors, limits_of, outside_positions, same_rotor
+from robot_dyn.tools.motors.limits import Limits, check_motors, limits_of, outside_positions, same_rotor
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
 from robot_dyn.tools.motors.motor_budget.joint_budget import JointBudget, joint_budgets
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
@@ -78,7 +78,8 @@ def budget(
         raise QueryError(
             "plant: a plan has no arm; give the arm, rd.tools.motors.budget(plan, arm), or a plant with effects"
         )
-    return _of_plan(motion, _loaded(plant, payload, motors), motors, given)
+    loaded = _loaded(plant, payload, motors)
+    return of_plan(motion, loaded, limits_of(loaded, motors, **given), _sources(motors, given))
 
 
 def _sources(motors: Motors | None, given: Mapping[str, Any]) -> str:
@@ -107,9 +108,8 @@ def _loaded(plant: Any, payload: Any, motors: Motors | None) -> Plant:
     return plant if robot is plant.dynamics else replace(plant, dynamics=robot)
 
 
-def _of_plan(
-    motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, motors: Motors | None, given: Mapping[str, Any]
-) -> MotorBudget:
+def of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, limits: Limits, sources: str) -> MotorBudget:
+    """Compute the budget of a plan under limits from sources, in words."""
     robot: Any = plant.dynamics
     plan = motion.plan if isinstance(motion, PathPlan) else motion if isinstance(motion, Plan) else None
     reference = motion if isinstance(motion, PiecewisePolynomial) else motion.reference
@@ -119,7 +119,6 @@ def _of_plan(
             f"the motion has {reference.n} joints{'' if plan is None else ', ' + ', '.join(joints)}; {robot.name} has"
             f" {robot.n}, {', '.join(robot.joint_names)}; use a motion of this arm"
         )
-    limits = limits_of(plant, motors, **given)
     demand = of_motion(reference, plant, limits)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
     findings = [*robot.announced_findings, *(() if plan is None else plan.findings), *outside]
@@ -127,7 +126,7 @@ def _of_plan(
         findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(
         robot, "motion" if plan is None else plan.method, demand, tuple(joint_budgets(demand, limits)),
-        _sources(motors, given), findings, [], (plant, reference, limits),
+        sources, findings, [], (plant, reference, limits),
     )  # fmt: skip
 
 

@@ -20,13 +20,13 @@ from robot_dyn.control import PiecewisePolynomial, Plan
 from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
-from robot_dyn.tools.motors.motor_budget.budget import budget
+from robot_dyn.tools.motors.motor_budget.budget import of_plan
+from robot_dyn.tools.motors.motor_budget.demand import of_motion
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.pace import Pace, at_pace, least_pace
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, through
-from robot_dyn.tools.motors.planning.path_at_limits import path
-from robot_dyn.tools.motors.planning.plannable import no_lines
+from robot_dyn.tools.motors.planning.path_at_limits import planned
 
 _RESTS = 1e-3  # relative to the largest velocity of a joint: anything slower is a stop
 _TIMES, _PLACES = 4000, 80  # number of sample times of a motion, and of points on the path between two stops
@@ -101,14 +101,14 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
         MissingExtraError: If toppra is not installed.
     """
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
-    no_lines(limits)
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, fraction)
-    bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": limits.continuous}
-    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, limits.continuous)
+    mean = of_motion(plan.reference, plant).mean_speed  # at a slower pace, more continuous torque is allowed
+    continuous = limits.at_mean_speed(mean).continuous
+    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, continuous)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
-    new_budget = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
+    new_budget = of_plan(plan, plant, limits, motor_budget.limits)
     result = {"before_s": before, "strokes": strokes, "fraction": fraction}
     if _fits(motor_budget, fraction) and (not new_budget.fits or plan.duration_s >= before):
         plan = replace(plan, reference=motion, method="the original motion", findings=motor_budget.findings)
@@ -143,14 +143,13 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, fraction
         raise PlanError("the motion is at rest throughout, so it has no path; give a motion that moves")
     q, since, off = motion.at(np.array([motion.start_s]))[0][0], motion.start_s, 0.0
     parts, findings = list[PiecewisePolynomial | None](), dict[str, None]()
-    bounds = {"effort": limits.effort, "velocity": limits.velocity, "acceleration": limits.acceleration}
     for start, end in strokes:
         way, places = _way(motion, start, end)
         points = np.array([np.interp(np.linspace(0, way[-1], _PLACES), way, column) for column in places.T]).T
         still = np.ptp(places, axis=0) <= _STILL
         points[:, still] = q[still]
         points[0] = q  # end of the previous stroke
-        stroke = path(plant, points, fraction=fraction, **bounds)
+        stroke = planned(plant, limits, points, fraction)
         parts += [_pause(q, start - since), stroke.reference]
         off, since, q = max(off, _distance(points, way, places)), end, points[-1]
         findings |= dict.fromkeys(stroke.findings)

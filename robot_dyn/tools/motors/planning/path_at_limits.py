@@ -23,7 +23,7 @@ from robot_dyn.tools.motors.planning.path_plan import (
     limit_use,
     phases,
 )
-from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, no_lines, why_not
+from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, why_not
 from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, fastest, imposed
 
 _CELLS, _MOST_CELLS = 200, 8000  # number of cells of the grid, in addition to breaks of the path
@@ -77,12 +77,16 @@ def path(
     Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis, 2018.
     """
     plant = plant if isinstance(plant, Plant) else Plant(plant)
+    check_motors(motors)
+    return planned(plant, limits_of(plant, motors, effort, velocity, acceleration), points, fraction)
+
+
+def planned(plant: Plant, limits: Limits, points: JointValues | PiecewisePolynomial, fraction: float) -> PathPlan:
+    """Plan the fastest motion along a path within limits, with torques up to a fraction of theirs."""
     fraction = number("fraction", fraction, error=PlanError, above=0.0)
     if fraction > 1:
         raise PlanError(f"fraction must be at most 1, got {fraction:g}")
-    check_motors(motors)
-    limits = limits_of(plant, motors, effort, velocity, acceleration).times(fraction)
-    no_lines(limits)
+    limits = limits.times(fraction)
     geometry = geometric_path(points, plant.dynamics.joint_names)
     check_effects(plant)
     check_positions(plant, geometry)
@@ -129,7 +133,7 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
 
 def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, float]:
     """Return the motion, and the error of its linearised effects as a share of the effort limits."""
-    fixed = _apart(path.breaks, turning_points(path)) if plant.forces else path.breaks
+    fixed = _apart(path.breaks, turning_points(path)) if _varies(plant, limits) else path.breaks
     cosine = (1 - np.cos(np.linspace(0, np.pi, _CELLS + 1))) / 2
     grid = _merged(fixed, path.breaks[0] + (path.breaks[-1] - path.breaks[0]) * cosine)
     duration = cells(plant, limits, path, grid, None).expected_duration
@@ -156,18 +160,23 @@ def _solved(
 
     Effects are linearised about the last speed, or about slower ones if there is no solution.
     """
-    places = imposed(grid).ravel()
+    places, varies = imposed(grid).ravel(), _varies(plant, limits)
     squares = np.maximum(np.interp(places, *last), _REST * last.x.max())
-    for slower in 4.0 ** np.arange(6 if plant.forces else 1):
-        effects = Effects.about(plant, path, places, squares / slower) if plant.forces else None
+    for slower in 4.0 ** np.arange(6 if varies else 1):
+        effects = Effects.about(plant, limits, path, places, squares / slower) if varies else None
         limits_in_cells = cells(plant, limits, path, grid, effects)
         for factor in _EXPECTED:
             if (x := fastest(limits_in_cells, factor * duration)) is not None:
                 speed = Speed(grid, x)
                 if effects is None:
                     return speed, 0.0
-                return speed, float(np.abs(effects.error(plant, path, np.interp(places, *speed)) / limits.effort).max())
+                return speed, effects.error(plant, limits, path, np.interp(places, *speed))
     raise PlanError(why_not(plant, limits, path))
+
+
+def _varies(plant: Plant, limits: Limits) -> bool:
+    """Return True if the torque of effects, or of the motors, may depend on the speed."""
+    return bool(plant.forces) or limits.line is not None
 
 
 def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tuple[np.ndarray, bool]:

@@ -119,7 +119,8 @@ def limit_use(plant: Plant, limits: Limits, motion: PiecewisePolynomial, t: np.n
     """Compute the shares of a plant's limits that a motion uses, by inverse dynamics."""
     q, v, a = motion.at(t)
     tau = plant.inverse_dynamics(q, v, a, t=0.0)
-    return LimitUse(t, (tau / limits.effort, v / limits.velocity, a / limits.acceleration))
+    torque = tau / limits.effort if limits.line is None else np.copysign(limits.used(tau, v), tau)
+    return LimitUse(t, (torque, v / limits.velocity, a / limits.acceleration))
 
 
 def checked_times(duration: float) -> np.ndarray:

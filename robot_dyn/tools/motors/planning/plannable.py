@@ -35,12 +35,6 @@ def check_effects(plant: Plant) -> None:
             raise PlanError(f"effect {effect.name!r} {reason}; remove it from the plant")
 
 
-def no_lines(limits: Limits) -> None:
-    """Raise a PlanError for torque–speed lines, which plans of paths do not keep."""
-    if limits.line is not None:
-        raise PlanError("paths at their limits do not keep torque–speed lines; give effort= and velocity= without them")
-
-
 def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
     """Raise a PlanError if a path leaves the joint limits or passes rigid stops."""
     for stops in (None, *(effect for effect in plant.effects if isinstance(effect, RigidStops))):

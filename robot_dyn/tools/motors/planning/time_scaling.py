@@ -6,6 +6,9 @@ a, b, c belong to the rigid bodies; h is the torque of effects, linearised in x 
 friction as a part of b would be scaled by ṡ² instead of ṡ. In a cell s̈ is constant, and the limits are imposed just
 after its start, in its middle and just before its end. [Pham, Pham, A New Approach to Time-Optimal Path
 Parameterization Based on Reachability Analysis, 2018]
+
+A torque–speed line ℓ bounds τ ≤ ℓ(v) where the motor drives; τ_max − ℓ(v) is linearised
+with h, as τ + τ_max − ℓ(v) ≤ τ_max.
 """
 
 from __future__ import annotations
@@ -63,22 +66,48 @@ class Effects(NamedTuple):
     slope: np.ndarray
 
     @classmethod
-    def about(cls, plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x0: np.ndarray) -> Effects:
+    def about(cls, plant: Plant, limits: Limits, path: PiecewisePolynomial, s: np.ndarray, x0: np.ndarray) -> Effects:
         """Linearise in x = ṡ² about x0 > 0; near rest, where ∂h/∂x of friction is large, the slope is 0."""
-        h = partial(effects_load, plant, path, s)
+        h = partial(effects_load, plant, limits, path, s)
         slope = (h(x0 * (1 + _BEND)) - h(x0 * (1 - _BEND))) / (2 * _BEND * x0)[:, None]
         slope[x0 < _SLOW * x0.max()] = 0.0
         return cls(s, x0, h(x0), slope)
 
-    def error(self, plant: Plant, path: PiecewisePolynomial, x: np.ndarray) -> np.ndarray:
-        """Return the error of the linearised torque at speeds x, (m, n)."""
-        return effects_load(plant, path, self.s, x) - self.h0 - self.slope * (x - self.x0)[:, None]
+    def error(self, plant: Plant, limits: Limits, path: PiecewisePolynomial, x: np.ndarray) -> float:
+        """Return the largest error of the linearised torque at speeds x, as a share of the effort limits."""
+        off = effects_load(plant, limits, path, self.s, x) - self.h0 - self.slope * (x - self.x0)[:, None]
+        return float(np.abs(off / efforts(limits)).max())
 
 
-def effects_load(plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the load h of the effects, −Σ τ_effect, (m, n), at places s with ṡ² = x, both (m,)."""
+def effects_load(plant: Plant, limits: Limits, path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the load h of the effects, −Σ τ_effect, (m, n), at places s with ṡ² = x, both (m,).
+
+    With torque–speed lines, it is h plus what lines take from the peak: of the upper limit, then of the lower, (m, 2n),
+    for the lines themselves and for each straight line of their hull, which has no corner that a slope misses.
+    """
     q, slope, _ = path.at(s)
-    return -plant.torque(q, slope * np.sqrt(x)[:, None], t=0.0)
+    v = slope * np.sqrt(x)[:, None]
+    h = -plant.torque(q, v, t=0.0)
+    if limits.line is None:
+        return h
+    slopes = _straight(limits)[1]
+    with np.errstate(invalid="ignore"):  # inf − inf of a joint without a limit
+        bent = np.where(limits.line.exists, limits.effort - np.minimum(limits.line.at(v), limits.effort), 0.0)
+    taken = [bent, *(-b * np.abs(v) for b in slopes[1:])]
+    return np.concatenate([h + sign * np.where(sign * v >= 0, x, 0.0) for x in taken for sign in (1, -1)], axis=1)
+
+
+def _straight(limits: Limits) -> tuple[np.ndarray, np.ndarray]:
+    """Return torque at rest and slope, (1 + m, n), of the effort limits and of the m straight lines of the hull."""
+    n = len(limits.effort)
+    a, b = (np.zeros((n, 0)),) * 2 if limits.line is None else limits.line.hull
+    flat = limits.effort[:, None]
+    return np.hstack([flat, np.where(b < 0, a, flat)]).T, np.hstack([np.zeros((n, 1)), b]).T
+
+
+def efforts(limits: Limits) -> np.ndarray:
+    """Return the limit of each column of `effects_load`."""
+    return limits.effort if limits.line is None else np.repeat(_straight(limits)[0], 2, axis=0).ravel()
 
 
 def imposed(grid: np.ndarray) -> np.ndarray:
@@ -93,15 +122,18 @@ def cells(plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndar
     rigid, zero = plant.dynamics.inverse_dynamics, np.zeros_like(q)
     still = rigid(q, zero, zero)
     A, B, C = rigid(q, zero, slope) - still, rigid(q, slope, bend) - still, still
+    effort = limits.effort
     if effects is not None:
+        A, B, C = (np.tile(x, effects.h0.shape[1] // n) for x in (A, B, C))
+        effort = efforts(limits)
         B, C = B + effects.slope, C + effects.h0 - effects.slope * effects.x0[:, None]
     fast = (slope**2 / limits.velocity**2).max(axis=-1, keepdims=True)
-    torque = (A / limits.effort, B / limits.effort, C / limits.effort)
+    torque = (A / effort, B / effort, C / effort)
     acceleration = (slope / limits.acceleration, bend / limits.acceleration, zero)
     velocity = (0 * fast, fast, 0 * fast)
     A, B, C = (np.concatenate(rows, axis=-1) for rows in zip(torque, acceleration, velocity, strict=True))
     A = A + 2 * ahead * B  # x in the cell is x at its start plus 2 s̈ times the distance from there
-    shape = len(grid) - 1, len(IMPOSED) * (2 * n + 1)
+    shape = len(grid) - 1, len(IMPOSED) * A.shape[1]
     return Cells(grid, (A.reshape(shape), B.reshape(shape), C.reshape(shape)))
 
 
