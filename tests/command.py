@@ -60,12 +60,11 @@ def interrupted_at_work(*args: str | Path, watched: str) -> str:
 def run(*args: str | Path) -> Done[str]:
     """The command in this process, its output no terminal; test_command_line.py checks that it is the same."""
     from robot_dyn.cli import main
-    from robot_dyn.foundations import waiting
 
     argv = ["-c", *map(str, args)]
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
     handler = signal.getsignal(signal.SIGINT)  # the command leaves it ignored, as the last act of a process
-    slow = mock.patch.object(waiting, "PATIENCE_S", 600.0)  # a busy machine waits longer
+    slow = mock.patch("robot_dyn.foundations.waiting.PATIENCE_S", 600.0)  # a busy machine waits longer
     with slow, mock.patch.multiple(sys, argv=argv, stdout=out, stderr=err):
         try:
             main()

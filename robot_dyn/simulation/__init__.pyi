@@ -6,6 +6,7 @@ from robot_dyn.simulation.dynamics.sampled_loop import linearised as linearised
 from robot_dyn.simulation.dynamics.stability import Stability as Stability
 from robot_dyn.simulation.dynamics.stability import step_map as step_map
 from robot_dyn.simulation.dynamics.state_equation import StateEquation as StateEquation
+from robot_dyn.simulation.engine.choice import choose as choose
 from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError as AccuracyError
 from robot_dyn.simulation.observation.observation import observation_of as observation_of
 from robot_dyn.simulation.observation.remarks import Remark as Remark
@@ -28,6 +29,7 @@ from robot_dyn.simulation.rollouts.rollouts import batch_of as batch_of
 from robot_dyn.simulation.run.outcome import Ending as Ending
 from robot_dyn.simulation.run.outcome import Outcome as Outcome
 from robot_dyn.simulation.run.outcome import Reason as Reason
+from robot_dyn.simulation.run.run import Run as Run
 from robot_dyn.simulation.setup.segment_table import segment_table as segment_table
 from robot_dyn.simulation.setup.settings import settings_of as settings_of
 from robot_dyn.simulation.setup.setup import MOST_BYTES as MOST_BYTES

@@ -14,7 +14,7 @@ import numpy as np
 from llvmlite import ir
 
 import robot_dyn as rd
-from robot_dyn.codegen import INSTEAD, program_of
+from robot_dyn.codegen import INSTEAD, Trace, program_of
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.batch import batch_function
 from robot_dyn.codegen.llvm.lock_step import write_function
@@ -23,7 +23,6 @@ from robot_dyn.codegen.llvm.target import Target, this_target
 from robot_dyn.codegen.llvm.vectors import F32, F64
 from robot_dyn.codegen.loops.kinds import kind_of
 from robot_dyn.codegen.loops.program import Program
-from robot_dyn.codegen.trace.trace import Trace
 from tests.tools.export import c_program
 
 X86 = "x86_64-unknown-linux-gnu"

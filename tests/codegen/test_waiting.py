@@ -16,7 +16,7 @@ import robot_dyn as rd
 from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.foundations import waiting
 from robot_dyn.foundations.waiting import log_if_slow
-from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation import choose
 from tests.command import MAIN, spawn
 
 

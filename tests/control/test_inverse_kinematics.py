@@ -11,8 +11,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.control import InverseKinematics, orientation_error
 from robot_dyn.control.pose import error_and_jacobian, logarithm
-from robot_dyn.foundations import PlanError, QueryError, hat
-from robot_dyn.foundations.spatial import rotation
+from robot_dyn.foundations import PlanError, QueryError, hat, rotation
 from tests.long import long, stress
 
 # kinova has continuous joints, panda a coupled one

@@ -18,10 +18,9 @@ from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError, tanh
 from robot_dyn.scene.effects import DeclaredEffect
-from robot_dyn.simulation import DoubtKind, MachineError, Verdict
+from robot_dyn.simulation import DoubtKind, MachineError, Verdict, choose
 from robot_dyn.simulation.diagnostics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.declarations import undeclared
-from robot_dyn.simulation.engine.choice import choose
 from tests.effect_examples import EFFECTS, example
 from tests.long import long
 

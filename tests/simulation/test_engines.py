@@ -15,10 +15,8 @@ import robot_dyn as rd
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.model import completed
-from robot_dyn.simulation import MachineError, StateEquation
+from robot_dyn.simulation import MachineError, Run, StateEquation, choose
 from robot_dyn.simulation.compiled.self_check import check
-from robot_dyn.simulation.engine.choice import choose
-from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.watch import Watch
 from tests.long import long
 from tests.own_method import OwnImplicit

@@ -10,12 +10,10 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.cli import report
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation import Doubt, DoubtKind, ErrorEstimate, Verdict
-from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation import Doubt, DoubtKind, ErrorEstimate, Run, Verdict, choose
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.results.error_estimate import no_estimate
 from robot_dyn.simulation.run.recording import Path
-from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.runner import Runner
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.long import long

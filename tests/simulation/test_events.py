@@ -166,7 +166,7 @@ def test_two_joints_that_meet_their_stops_at_once() -> None:
 
 
 def test_machine_code_paused_at_every_third_step_gives_the_same_bits(monkeypatch) -> None:
-    from robot_dyn.simulation.run.run import Run
+    from robot_dyn.simulation import Run
 
     options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 2.0, "engine": "compiled", "estimate_error": False}
     plant = rd.Plant(ARM, rd.effects.joint_stops([-1.0, -1.0], [1.0, 1.0], 1e5))

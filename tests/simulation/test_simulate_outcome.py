@@ -12,8 +12,7 @@ import robot_dyn as rd
 from robot_dyn.control import Stateless
 from robot_dyn.effects import Conservative
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SingularError
-from robot_dyn.simulation import RemarkKind
-from robot_dyn.simulation.run.run import Run
+from robot_dyn.simulation import RemarkKind, Run
 from tests.long import long
 from tests.user_parts import Push
 

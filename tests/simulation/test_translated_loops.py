@@ -18,13 +18,11 @@ from robot_dyn.foundations import FLOAT64, MachineCodeError
 from robot_dyn.integrate import FIXED_STEP, FixedStepper, PlainMethod, method
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation import StateEquation, machine_code, observation_of, segment_table
+from robot_dyn.simulation import Run, StateEquation, choose, machine_code, observation_of, segment_table
 from robot_dyn.simulation.dynamics.loop_state import Ended, lanes_of, loop_config, start_position
-from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.run.fixed_steps import samples_at_most
 from robot_dyn.simulation.run.recording import Loop, records_of
-from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.time_loop import time_loop
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
