@@ -1,6 +1,7 @@
 """C of every robot of the catalog, compiled, tested and timed: python -m tests.campaigns.exported_c [ROBOT …].
 
-A table of each function: operations, largest difference from Pinocchio, bound, time of a call from C, bytes of code.
+Float is built and tested, too, without an operation in double. A table of each function in double: operations, largest
+difference from Pinocchio, bound, time of a call from C, bytes of code.
 """
 
 from __future__ import annotations
@@ -99,6 +100,11 @@ def main(names: list[str]) -> None:
             assert needed <= {*source.math, "sincos"} and not kinds & WRITABLE, (name, needed, kinds)
             assert re.search(r"^passed$", self_test(source, Path(folder)), re.MULTILINE), name
             ns, code = timed(source, Path(folder)), sizes(compiled)
+        with tempfile.TemporaryDirectory() as folder:
+            in_float = rd.tools.export.c_source(arm, dtype="float32")
+            needed, _ = symbols(library(in_float, Path(folder)))
+            assert needed <= {*(x + "f" for x in in_float.math), "sincosf"}, (name, needed)
+            assert re.search(r"^passed$", self_test(in_float, Path(folder)), re.MULTILINE), name
         for x in source.functions:
             bound = "" if x.bound is None else f"{x.bound:.1e}"
             of_code = code[f"{source.name}_{x.quantity}"]

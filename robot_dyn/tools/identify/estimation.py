@@ -49,6 +49,13 @@ class Model(Value):
         return result
 
     @cached_property
+    def stated(self) -> np.ndarray:
+        """Base parameters and distinguishable rotor inertias as the arm states them."""
+        return np.concatenate(
+            [self.base.R @ self.arm.inertial_parameters, np.array(self.arm.armature)[list(self.rotors)]]
+        )
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters, without the time offset."""
         kinds = (VISCOUS, COULOMB, OFFSET)

@@ -167,9 +167,7 @@ def _held_out(model: Model, found: Estimate) -> HeldOut:
     rows, m = found.rows, len(found.rows.tau)
     training = np.arange(m)[:, None] < _TRAINING * m
     n, last = model.arm.n, rows.used & ~training
-    own = np.concatenate(
-        [model.base.R @ model.arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]]
-    )
+    own = model.stated
     rest = rows.tau - rows.Y[..., : len(own)] @ own
     joints = np.arange(len(own), len(own) + 3 * n)
     fitted = fit(rows.where(training).only(joints, rest))
@@ -193,9 +191,7 @@ def _refuse_foreign(arm: Robot, found: Estimate, held_out: HeldOut) -> None:
 
 
 def _parameters(model: Model, found: Estimate) -> Iterable[Parameter]:
-    own = np.concatenate(
-        [model.base.R @ model.arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]]
-    )
+    own = model.stated
     values = np.concatenate([own, np.full(len(found.fit.names) - len(own), np.nan)])
     robust = found.fit.half_widths / found.fit.standard_errors * np.sqrt(np.diag(found.fit.robust))
     for row in zip(found.fit.names[:-1], found.fit.values, found.fit.half_widths, robust, values, strict=False):

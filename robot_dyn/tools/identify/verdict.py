@@ -112,9 +112,8 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
     """
     signals, rows, n = found.signals, found.rows, model.arm.n
     arm, state = model.arm.with_(armature=0.0), found.state
-    at_rest = np.concatenate([model.base.R @ arm.inertial_parameters, np.array(model.arm.armature)[list(model.rotors)]])
-    r, own = len(at_rest), np.zeros(len(rows.names))
-    own[:r] = at_rest
+    r, own = len(model.stated), np.zeros(len(rows.names))
+    own[:r] = model.stated
     if friction is not None:
         own[r : r + 2 * n] = friction.ravel()
     shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
@@ -122,7 +121,8 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
     for *name, columns in _candidates(arm, links, model, rows.Y, own, friction):
         C = columns(*state)
         C = (C if len(C) == len(rows.tau) else signals.second(C)).reshape(rows.tau.size, -1)
-        candidates.append((*name, C[:, np.abs(C).max(axis=0) > _NOTHING]))
+        seen = (np.abs(C).max(axis=0) > _NOTHING) | (name[0] == "load")  # whose first coefficient is its mass
+        candidates.append((*name, C[:, seen]))
     y, used = (shifted - rows.Y @ own).ravel(), rows.used.reshape(-1)
     noise = _noise(
         y, np.column_stack([rows.Y.reshape(len(y), -1), *(C for *_, C in candidates)]), rows.used, found.fit.rms
@@ -142,6 +142,8 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
         fitted, x, covariance = _fitted(np.column_stack([C, nuisance]), y)
         k, chi2 = C.shape[1], float(((y - fitted) ** 2).sum())
         spread = 1.96 * np.sqrt(np.diag(covariance)[:k] * max(chi2 / count, 1.0))
+        if kind == "load" and x[0] <= spread[0]:  # without mass, it stands for another cause
+            continue
         part = (start - chi2) / max(start - full, 1e-300)
         values, widths = (x[:k] * factor)[:_SHOWN], (spread * factor)[:_SHOWN]
         causes.append((chi2, k * np.log(count), (kind, where, values, widths, unit, part)))
