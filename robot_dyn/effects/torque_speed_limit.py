@@ -208,7 +208,7 @@ class TorqueSpeedLimit(Bound):
 
 def check_place(at: object, has_ratio: bool, error: type[RobotDynError]) -> None:
     """Raise an error unless values are at the joint, or at the motor with a gear ratio."""
-    if at not in AT:
+    if not isinstance(at, str) or at not in AT:
         raise error(f"at must be joint or motor, got {shown(at)}")
     if (at == "motor") != has_ratio:
         more = "give gear_ratio, 1 without a gear" if at == "motor" else "set at to motor, or remove gear_ratio"
