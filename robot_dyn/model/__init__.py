@@ -3,6 +3,7 @@
 robot: the class · calls: Pinocchio's function for each query
 loading: `load` · from_pinocchio: robots from a `pinocchio.Model`
 pinocchio_model: builds the model
+newton_euler: wrenches through moving and fixed joints
 evaluation: checks, batches and mimic joints around a call
 coriolis, regrouped: C without loss of digits · conditioning: singular or nearly singular M
 findings: doubtful values in a valid description · right_angles: right angles with all digits

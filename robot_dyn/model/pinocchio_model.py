@@ -73,16 +73,8 @@ def build(description: Description, edits: Edits) -> Built:
         EditError: If the link of an edit is unknown, or all joints are locked.
     """
     robot = description.element
-    write_edits(robot, edits)
     mimics = stated_mimics(robot)
-    for joint in robot.iterfind("joint"):
-        joint.set("name", _MARK + joint.get("name"))
-        if joint.get("type") == "continuous":
-            joint.set("type", "revolute")  # with limits of ±1e308: q is then one number, as is v
-    try:
-        model = pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"))
-    except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
-        raise DescriptionError(f"{description.source}: Pinocchio rejects it: {error}") from None
+    model = _model(robot, description.source, edits)
     if model.nv == 0:
         raise DescriptionError(
             f"{description.source}: no joint moves, so the robot has no dynamics;"
@@ -97,6 +89,49 @@ def build(description: Description, edits: Edits) -> Built:
     model = _locked(model, edits, mimics)
     _unmark(model)
     return Built(model, *_couplings(tuple(model.names[1:]), mimics), description)
+
+
+def every_joint(description: Description, edits: Edits, joint_names: tuple[str, ...]) -> tuple[pin.Model, Couplings]:
+    """Return a model in which fixed and locked joints may move, and the map from q to the positions of its joints.
+
+    Joint 1 of the model carries the root link.
+
+    Raises:
+        DescriptionError: If there are more than `MAX_MOVING` joints, fixed ones included.
+    """
+    robot = description.element
+    mimics = stated_mimics(robot)
+    if (count := len(robot.findall("joint"))) >= MAX_MOVING:
+        raise DescriptionError(
+            f"{description.source}: wrenches need a working memory that grows with the cube of the number of joints,"
+            f" {count} with the fixed ones; merge links to have less than {MAX_MOVING}"
+        )
+    for joint in robot.iterfind("joint[@type='fixed']"):
+        joint.set("type", "revolute")
+        etree.SubElement(joint, "axis", xyz="0 0 1")
+        etree.SubElement(joint, "limit", effort="0", velocity="0")
+    model = _model(robot, description.source, edits, pin.JointModelRZ())
+    _apply(edits, model)
+    _unmark(model)
+    couplings, names = _couplings(tuple(model.names[1:]), mimics)
+    locked = np.zeros(len(names))
+    for name, value in edits.lock:
+        locked[names.index(name)] = value
+    S, s0 = couplings.S[:, [names.index(name) for name in joint_names]], couplings.S @ locked + couplings.s0
+    return model, Couplings(S, s0)
+
+
+def _model(robot: etree._Element, source: str, edits: Edits, *root: Any) -> pin.Model:
+    """Return the model of a file with the edits of its links, and with marked joints; a root joint is optional."""
+    write_edits(robot, edits)
+    for joint in robot.iterfind("joint"):
+        joint.set("name", _MARK + joint.get("name"))
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")  # with limits of ±1e308: q is then one number, as is v
+    try:
+        return pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"), *root)
+    except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
+        raise DescriptionError(f"{source}: Pinocchio rejects it: {error}") from None
 
 
 def write_edits(robot: etree._Element, edits: Edits) -> None:

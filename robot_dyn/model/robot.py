@@ -57,6 +57,7 @@ from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of, zero_efforts
 from robot_dyn.model.from_pinocchio import described
 from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, robot_line
+from robot_dyn.model.newton_euler import JointWrenches, NewtonEuler, joint_wrenches
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
 from robot_dyn.model.remarks import no_torque
 from robot_dyn.model.to_urdf import write_urdf
@@ -139,6 +140,37 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             if is_moderate(a, DOUBTFUL):
                 return a
         return self._answer("forward_dynamics", (q, v, tau), out)
+
+    def joint_wrenches(
+        self, q: JointValues, v: JointValues, a: JointValues, *, external: Mapping[str, ArrayLike] | None = None,
+        frame: str | None = None, at: str | None = None,
+    ) -> JointWrenches:  # fmt: skip
+        """Return the force and torque through every joint, moving or fixed, and of the ground on the root link.
+
+            F_j = Σ_l (𝓜_l V̇_l − ad_{V_l}ᵀ 𝓜_l V_l − F_gravity,l − F_external,l),   links l that joint j carries
+
+        F = (f, τ) is exerted by the parent link on the child link, at the joint's origin and in the axes of the child
+        link. Its component on the axis of a joint is the torque on the load side of the drive: inverse dynamics without
+        friction and without armature, whose rotors do not count. An impact is an impulse in N s, and is not included.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            a: Accelerations, shape (..., n), in [rad/s²] or [m/s²].
+            external: Wrenches on links, (..., 6) in [N] and [N m] by link, in base axes at the link's frame; those of
+                effects do not count otherwise.
+            frame: Link whose axes are used for all wrenches; None for those of each child link.
+            at: Link at whose origin all torques are taken; None for the origin of each joint.
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite, or a link is unknown.
+            OverflowedError: If the result would not be finite.
+            DescriptionError: If the file has 250 joints or more.
+
+        Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 5.
+        """
+        state = {"q": q, "v": v, "a": a}
+        return joint_wrenches(self._recursion, self, self.description.joint_frames, state, external, frame, at)
 
     # --- properties
 
@@ -482,6 +514,10 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
     @cached_property
     def _evaluation(self) -> Evaluation:
         return Evaluation(self._built, self._scratch)
+
+    @cached_property
+    def _recursion(self) -> NewtonEuler:
+        return NewtonEuler.from_edits(self.description, self.edits, self.joint_names)
 
     @cached_property
     def _shape(self) -> tuple[int] | None:

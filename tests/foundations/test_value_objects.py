@@ -42,7 +42,7 @@ NO_VALUES = FOR_AUTHORS | {
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "CompiledDynamics", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate",
     "ExplicitRungeKutta",
-    "GaussLegendre", "Ledger", "Outcome", "Rosenbrock", "Statistics", "TaskDynamics", "WorstCase",
+    "GaussLegendre", "JointWrenches", "Ledger", "Outcome", "Rosenbrock", "Statistics", "TaskDynamics", "WorstCase",
 }  # fmt: skip
 NAMES = sorted(CLASSES - NO_VALUES | HELD)
 
@@ -81,6 +81,7 @@ def values() -> dict[str, Any]:
         rd.Event(height), rd.effects.Threshold(0, 0.5, "upper stop", "touched", "left"),
         rd.effects.Layer(0, 0.01, of_velocity=True),
         rd.integrate.Adaptive(), rd.accuracy.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM,
+        ARM.joint_wrenches(Q, Q, Q),
         rd.Lagrangian(ARM), plant,
         rd.control.PD(PLAN, kp=[1.0, 2.0], kd=1.0), rd.control.PID(PLAN, kp=1.0, ki=1.0, kd=1.0),
         rd.control.PDGravity(ARM, PLAN, kp=1.0, kd=1.0),

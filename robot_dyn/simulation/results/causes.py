@@ -13,6 +13,7 @@ from robot_dyn.effects.causes import Causes, by_cause, exerted_torques
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.model import right_angles
+from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.results.samples import Columns
@@ -69,14 +70,20 @@ def causes_of(run: TrajectoryData) -> Causes:
     Raises:
         QueryError: If the run contains no robot, or lacks a quantity that is needed.
     """
+    robot, exerted = bodies_and_effects(run)
+    return by_cause(robot, run.t, run.q, run.v, run.a, run.u, exerted)
+
+
+def bodies_and_effects(run: TrajectoryData) -> tuple[Robot, dict[str, np.ndarray]]:
+    """Return the robot of a run and the torques of its effects; raise a QueryError if the run lacks them."""
     if run.effect_torques is None:
         raise QueryError(
-            "the run contains no torques of its effects, so its torque cannot be split by cause: simulate it again"
-            " with its error estimate (a run of rollouts with rd.simulate(runs.setup_of(i)))"
+            "the run contains no torques of its effects: simulate it again with its error estimate"
+            " (a run of rollouts with rd.simulate(runs.setup_of(i)))"
         )
     if np.isnan(run.a).all() or np.isnan(run.u).all():
         raise QueryError("the run contains no accelerations or no actuation; simulate it with rd.simulate")
     robot = robot_of(run)
     if "right_angles" in run.metadata:
         robot, _ = right_angles.completed(robot)
-    return by_cause(robot, run.t, run.q, run.v, run.a, run.u, run.effect_torques)
+    return robot, run.effect_torques

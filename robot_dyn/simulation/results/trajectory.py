@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike
 from robot_dyn.effects.causes import Causes
 from robot_dyn.foundations.display import MOST_JOINTS, curves, plot
 from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.model.newton_euler import JointWrenches
 from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.causes import causes_of
 from robot_dyn.simulation.results.formats.save import save_data
+from robot_dyn.simulation.results.joint_wrenches import joint_wrenches_of
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.results.run_file import write_run
@@ -104,6 +106,22 @@ class Trajectory(TrajectoryData):
             QueryError: If the run contains no robot, or no torques of its effects.
         """
         return causes_of(self)
+
+    def joint_wrenches(self, *, frame: str | None = None, at: str | None = None) -> JointWrenches:
+        """Return the force and torque through every joint, and on the root link, at the samples, (m, k, 6).
+
+        External wrenches count; friction, stops and drives act between parent and child. An impact is an impulse in N s
+        between two samples, and is not included. Samples without an acceleration are nan. See `Robot.joint_wrenches`.
+
+        Args:
+            frame: Link whose axes are used for all wrenches; None for those of each child link.
+            at: Link at whose origin all torques are taken; None for the origin of each joint.
+
+        Raises:
+            QueryError: If the run contains no robot, a link is unknown, or the forces of an effect on the links are:
+                those of line springs, of payloads that come and go, and of user-defined effects.
+        """
+        return joint_wrenches_of(self, frame, at)
 
     @property
     def summary(self) -> str:
