@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -21,7 +21,7 @@ from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.foundations.arithmetic import apply, transpose
 from robot_dyn.foundations.errors import OverflowedError
-from robot_dyn.foundations.validate import check_batches, choice, instance, rows, shaped
+from robot_dyn.foundations.validate import JointValues, check_batches, choice, instance, rows, shaped
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.calls import Scratch
 from robot_dyn.model.pinocchio_model import every_joint
@@ -101,8 +101,9 @@ class NewtonEuler:
 
 
 def joint_wrenches(
-    recursion: NewtonEuler, dynamics: Dynamics[ndarray], joint_frames: Mapping[str, str], state: Mapping[str, Any],
-    external: Mapping[str, ArrayLike] | None, frame: str | None, at: str | None,
+    recursion: NewtonEuler, dynamics: Dynamics[ndarray], joint_frames: Mapping[str, str],
+    state: Mapping[str, JointValues], external: Mapping[str, ArrayLike] | None, frame: str | None,
+    at: str | None,
 ) -> JointWrenches:  # fmt: skip
     """Return the wrenches at a state (q, v, a by name); for the other arguments, see `Robot.joint_wrenches`."""
     arrays = {name: shaped(name, x, dynamics.joint_names) for name, x in state.items()}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lxml import etree
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
 from robot_dyn.effects import Force
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 E = rd.effects
 ROUNDING = 1e-12  # of the largest force or torque: sums in another order
 G = 9.80665
-BODY = rd.Payload("tool0", 1.5, (0.03, -0.02, 0.1), np.diag([0.01, 0.02, 0.025]))
+BODY = rd.Payload("tool0", 1.5, (0.03, -0.02, 0.1), ((0.01, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.025)))
 
 
 def turn(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -131,8 +131,8 @@ def test_wrenches_are_those_of_an_independent_newton_euler(name: str, edits: Any
     q, v, a = rng.normal(size=(3, 4, arm.n))
     found = arm.joint_wrenches(q, v, a)
     for i in range(4):
-        states = (full(arm, x[i], rates=x is not q) for x in (q, v, a))
-        expected = newton_euler(arm, *states, **options)
+        positions, speeds, rates = (full(arm, x[i], rates=x is not q) for x in (q, v, a))
+        expected = newton_euler(arm, positions, speeds, rates, **options)
         rows = [expected.get(joint, np.zeros(6)) for joint in found.joints]
         size = max(map(np.abs, (*rows, expected[""])), key=np.max).max()
         np.testing.assert_allclose(found.at_joints[i], rows, rtol=0, atol=ROUNDING * size)
@@ -207,9 +207,22 @@ def test_wrenches_of_a_run_balance_its_actuation_and_its_effects(engine: str) ->
     wrenches = run.joint_wrenches()
     axes = {joint.get("name"): joint.find("axis") for joint in arm.description.element.iterfind("joint")}
     on_axes = [wrenches[name][:, 3:] @ np.array(axes[name].get("xyz").split(), float) for name in arm.joint_names]
-    inner = sum(torque for name, torque in run.effect_torques.items() if name != "external_wrench")
+    inner = sum(torque for name, torque in (run.effect_torques or {}).items() if name != "external_wrench")
     np.testing.assert_allclose(np.array(on_axes).T, run.u + inner, rtol=0, atol=1e-9)
     assert run.joint_wrenches(frame="base_link", at="tool0")["ee_fixed_joint"].shape == (len(run.t), 6)
+
+
+def test_impacts_at_stops_are_in_no_sample() -> None:
+    """The load side of each joint is u plus the torques of stops and friction, which are finite between impacts."""
+    arm = rd.load("planar_2r")
+    plant = rd.Plant(arm, [E.RigidStops([-0.5, -0.2], [0.5, 0.5], 0.3), E.ViscousFriction(0.1)])
+    run = rd.simulate(plant, [0.4, 0.1], [1.0, -0.6], duration_s=0.4, engine="interpreted", estimate_error=False)
+    wrenches = run.joint_wrenches()
+    axes = [np.array(joint.get("xyz").split(), float) for joint in arm.description.element.iterfind("joint/axis")]
+    on_axes = np.array([wrenches[name][:, 3:] @ axis for name, axis in zip(arm.joint_names, axes, strict=False)]).T
+    exerted = sum((run.effect_torques or {}).values(), start=run.u)
+    assert any("stop" in event.name for event in run.events)
+    np.testing.assert_allclose(on_axes, exerted, rtol=0, atol=1e-11 * np.abs(exerted).max())
 
 
 def test_every_effect_of_the_library_acts_at_joints_or_on_links() -> None:
