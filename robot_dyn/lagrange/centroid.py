@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array, apply
+from robot_dyn.foundations.arithmetic import Array, Scalar, apply
 from robot_dyn.foundations.spatial import block_diagonal, first_moment, hat
 from robot_dyn.lagrange.christoffel import jacobian_derivative
 from robot_dyn.lagrange.linkage import Configuration
@@ -59,5 +59,5 @@ def _columns(at: Configuration, rows: int, terms: Callable[[Summand, Array], Arr
     return at.linkage.couplings.columns(total)
 
 
-def _mass(at: Configuration) -> Array:
+def _mass(at: Configuration) -> Scalar:
     return sum(inertia[0, 0] for inertia in at.linkage.inertias)
