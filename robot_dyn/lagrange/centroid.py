@@ -6,10 +6,12 @@ c = Σ (m p + R m c_b) / Σ m,   ∂c/∂q = Σ R (𝓜 J)_linear / Σ m,   h_G 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
+from operator import add
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array, Scalar, apply
+from robot_dyn.foundations.arithmetic import Array, apply
 from robot_dyn.foundations.spatial import block_diagonal, first_moment, hat
 from robot_dyn.lagrange.christoffel import jacobian_derivative
 from robot_dyn.lagrange.linkage import Configuration
@@ -59,5 +61,5 @@ def _columns(at: Configuration, rows: int, terms: Callable[[Summand, Array], Arr
     return at.linkage.couplings.columns(total)
 
 
-def _mass(at: Configuration) -> Scalar:
-    return sum(inertia[0, 0] for inertia in at.linkage.inertias)
+def _mass(at: Configuration) -> Array:
+    return reduce(add, (inertia[0, 0] for inertia in at.linkage.inertias))
