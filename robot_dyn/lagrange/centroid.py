@@ -6,6 +6,8 @@ c = Σ (m p + R m c_b) / Σ m,   ∂c/∂q = Σ R (𝓜 J)_linear / Σ m,   h_G 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -60,4 +62,4 @@ def _columns(at: Configuration, rows: int, terms: Callable[[Summand, Array], Arr
 
 
 def _mass(at: Configuration) -> Array:
-    return sum(inertia[0, 0] for inertia in at.linkage.inertias)
+    return reduce(add, (inertia[0, 0] for inertia in at.linkage.inertias))

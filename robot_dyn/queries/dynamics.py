@@ -221,7 +221,7 @@ class Dynamics(NamesNearest, ABC, Generic[Answer]):
         with arithmetic.scope():
             mean, half = sum(velocities.values()) / 2, (velocities["v"] - velocities["v_r"]) / 2
             zero = 0 * half
-            return into(out, Y(q, mean, a) - Y(q, half, zero) + Y(q, zero, zero))
+            return cast(Any, into)(out, Y(q, mean, a) - Y(q, half, zero) + Y(q, zero, zero))
 
     @query(4, 4, unit="1 and m", terms=_placement_terms)
     def placement(self, q: JointValues, frame: str, *, out: Answer | None = None) -> Answer:

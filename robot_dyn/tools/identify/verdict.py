@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -146,9 +147,9 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray
             continue
         part = (start - chi2) / max(start - full, 1e-300)
         values, widths = (x[:k] * factor)[:_SHOWN], (spread * factor)[:_SHOWN]
-        causes.append((chi2, k * np.log(count), (kind, where, values, widths, unit, part)))
+        causes.append((chi2, k * np.log(count), partial(Cause, kind, where, values, widths, unit, part)))
     dispersion = max(1.0, min((chi2 for chi2, *_ in causes), default=0.0) / count)
-    ranked = (Cause(*cause, float(chi2 / dispersion + penalty)) for chi2, penalty, cause in causes)
+    ranked = (cause(float(chi2 / dispersion + penalty)) for chi2, penalty, cause in causes)
     return Verdict(ratios, tuple(sorted(ranked, key=lambda cause: cause.bic)))
 
 
