@@ -28,6 +28,7 @@ from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, 
 
 _CELLS, _MOST_CELLS = 200, 8000  # number of cells of the grid, in addition to breaks of the path
 _ROUNDS = 40
+_PATIENCE = 6  # number of rounds in which the error must fall to half
 _TIGHTER = 3  # number of attempts with tighter limits if the motion exceeds them
 _ERROR = 1e-4  # largest error of linearised torque, as a share of its limit
 _REST = 1e-20  # relative to the largest ṡ²: speed at which effects at rest are linearised, so that friction has a sign
@@ -122,8 +123,8 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
         motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
         use = limit_use(plant, limits, motion, checked_times(motion.end_s))
         largest = float(use.largest.max())
-        if largest <= _REFUSED and error <= _ERROR:
-            return motion, use
+        if largest <= _REFUSED and (error <= _ERROR or limits.line is not None):
+            return motion, use  # where a line is steep, its linearisation is off, but the motion is within limits
         allowed /= max(1.0, largest)
     raise PlanError(
         f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the error of the torque"
@@ -138,7 +139,7 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
     grid = _merged(fixed, path.breaks[0] + (path.breaks[-1] - path.breaks[0]) * cosine)
     duration = cells(plant, limits, path, grid, None).expected_duration
     last = Speed(path.breaks[[0, -1]], np.full(2, ((path.breaks[-1] - path.breaks[0]) / duration) ** 2))
-    motion, error = hold(path.at(path.breaks[0])[0]), inf
+    motion, error, errors = hold(path.at(path.breaks[0])[0]), inf, []
     for turn in range(_ROUNDS):
         last, error = _solved(plant, limits, path, grid, last, duration)
         motion = in_time(path, last.s, last.x)
@@ -147,8 +148,11 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
             grid = _merged(fixed, _places(last, motion.breaks, np.linspace(0, duration, _CELLS + 1)))
             continue
         bad, settled = _unsettled(plant, limits, motion)
-        if error < _ERROR and (settled or not bad.any() or len(grid) > _MOST_CELLS):
+        if error < _ERROR and (settled or not bad.any()) or len(grid) > _MOST_CELLS:
             break
+        errors.append(error)
+        if min(errors) > _ERROR and min(errors[-_PATIENCE:]) > min(errors[:-_PATIENCE], default=inf) / 2:
+            break  # the speed alternates between two sides of a corner
         grid = np.sort(np.concatenate([grid, (grid[:-1] + grid[1:])[bad] / 2]))
     return motion, error
 
