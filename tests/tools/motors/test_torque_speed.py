@@ -143,6 +143,7 @@ def test_paths_at_their_limits_keep_random_lines(seed: int) -> None:
 
 
 @toppra
+@pytest.mark.long
 def test_a_path_of_one_joint_is_that_of_the_closed_form() -> None:
     """A mass on P (1 − v/v₀) while driving and −P while braking, from rest to rest: the switch by a root.
 
@@ -163,6 +164,24 @@ def test_a_path_of_one_joint_is_that_of_the_closed_form() -> None:
         gone = free * t - T * v + v**2 / (2 * peak / MASS)
         low, high = (t, high) if gone < way else (low, t)
     assert 0.999 <= plan.duration_s / (t + v / (peak / MASS)) <= 1.003
+
+
+@toppra
+@pytest.mark.long
+def test_a_path_below_lines_with_a_cliff_is_within_limits_or_refused() -> None:
+    """The linearised lines alternate between both sides of the cliff, so that rounds must end by their number."""
+    shape = ((0.0, 1.0), (1.0, 0.8), (1.01, 0.1), (4.0, 0.0))
+    peak = {"joint_1": 70.0, "joint_2": 20.0}
+    lines = {name: tuple((v, y * torque) for v, y in shape) for name, torque in peak.items()}
+    motors = rd.tools.motors.Motors(
+        peak=peak, continuous={}, speed=dict.fromkeys(peak, 4.0), armature={}, line=lines
+    )  # fmt: skip
+    way = [[-1.2, 0.4], [-1.5, 0.8], [-2.4, -0.5]]
+    try:
+        plan = rd.tools.motors.path(ARM, way, motors=motors)
+    except PlanError:
+        return
+    assert worst_use(rd.Plant(ARM), plan.reference, motors) <= 1.001
 
 
 @toppra

@@ -126,9 +126,10 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
         if largest <= _REFUSED and (error <= _ERROR or limits.line is not None):
             return motion, use  # where a line is steep, its linearisation is off, but the motion is within limits
         allowed /= max(1.0, largest)
+    remedy = "smoother effects" if limits.line is None else "lines of torque over speed without steep parts"
     raise PlanError(
-        f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the error of the torque"
-        f" of effects is {error:.2g} of the limits; use a smoother path or smoother effects"
+        f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the linearised torque is off"
+        f" by {error:.2g} of the limits; use a smoother path or {remedy}"
     )
 
 
