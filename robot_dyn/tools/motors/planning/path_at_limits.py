@@ -28,7 +28,7 @@ from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, 
 
 _CELLS, _MOST_CELLS = 200, 8000  # number of cells of the grid, in addition to breaks of the path
 _ROUNDS = 40
-_PATIENCE = 6  # number of rounds in which the error must fall to half
+_PATIENCE = 3  # number of rounds in which the error of lines must fall to half
 _TIGHTER = 3  # number of attempts with tighter limits if the motion exceeds them
 _ERROR = 1e-4  # largest error of linearised torque, as a share of its limit
 _REST = 1e-20  # relative to the largest ṡ²: speed at which effects at rest are linearised, so that friction has a sign
@@ -128,8 +128,8 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
         allowed /= max(1.0, largest)
     remedy = "smoother effects" if limits.line is None else "lines of torque over speed without steep parts"
     raise PlanError(
-        f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the linearised torque is off"
-        f" by {error:.2g} of the limits; use a smoother path or {remedy}"
+        f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the linearised"
+        f" torque is off by {error:.2g} of the limits; use a smoother path or {remedy}"
     )
 
 
@@ -149,10 +149,11 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
             grid = _merged(fixed, _places(last, motion.breaks, np.linspace(0, duration, _CELLS + 1)))
             continue
         bad, settled = _unsettled(plant, limits, motion)
-        if error < _ERROR and (settled or not bad.any()) or len(grid) > _MOST_CELLS:
+        if (error < _ERROR and (settled or not bad.any())) or len(grid) > _MOST_CELLS:
             break
         errors.append(error)
-        if min(errors) > _ERROR and min(errors[-_PATIENCE:]) > min(errors[:-_PATIENCE], default=inf) / 2:
+        falls = min(errors[-_PATIENCE:]) < min(errors[:-_PATIENCE], default=inf) / 2
+        if limits.line is not None and min(errors) > _ERROR and not falls:
             break  # the speed alternates between two sides of a corner
         grid = np.sort(np.concatenate([grid, (grid[:-1] + grid[1:])[bad] / 2]))
     return motion, error
