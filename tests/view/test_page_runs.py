@@ -38,7 +38,7 @@ def test_two_runs_show_desired_motion_difference_and_settings(browser, runs, wid
         assert "they part at t = 0.01 s" in titles[number]
         drawn = np.array(view.ask(f"replay.plots.figures[{number}].data.map((each) => [...each])"), dtype=float)
         np.testing.assert_allclose(drawn[1:].T, b.q - a.q, atol=1e-6)  # single precision
-        desired = view.ask("[...replay.plots.figures[0].data[5]]")
+        desired = view.ask("[...replay.plots.figures[0].data[3]]")  # t, q of both runs, q_d
         assert a.desired is not None
         np.testing.assert_allclose(desired, a.desired[:, 0], atol=1e-6)
         rows = "[...document.querySelectorAll('.differs')].map((e) => [...e.rows ?? e.querySelectorAll('tr')]"
@@ -51,7 +51,7 @@ def test_a_desired_curve_is_hidden_with_that_of_its_joint(browser, runs) -> None
     with opened(browser, rd.replay(runs[0])) as view:
         shown = "replay.plots.figures[0].series.map((each) => each.show)"
         view.page.locator(".u-series th[tabindex]").first.click()
-        assert view.ask(shown)[1:] == [False, True, False, True]
+        assert view.ask(shown)[1:] == [False, False, True, True]
 
 
 def test_limits_near_a_curve_are_drawn_and_others_are_named(runs) -> None:
