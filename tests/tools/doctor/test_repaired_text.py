@@ -84,13 +84,13 @@ def small(count: int) -> list[str]:
 @pytest.mark.parametrize("name", [*small(4), *long(small(36)[4:])])
 def test_of_a_file_of_the_catalog_only_lines_with_repairs_change(name: str) -> None:
     path = catalog.find(name)
-    text = path.read_bytes()
+    text = path.read_bytes().replace(b"package://", b"package://absent/")  # without its meshes, which take minutes
     places = [*re.finditer(rb"<mass\s+value\s*=\s*[\"'](\d+\.\d+)[\"']", text)]
     if not places:
         pytest.skip("no mass with a decimal point")
     place = places[np.random.default_rng(1).integers(len(places))]
     broken = text[: place.start(1)] + place[1].replace(b".", b",") + text[place.end(1) :]
-    checkup = checked(broken, "rig.urdf")  # without its meshes
+    checkup = checked(broken, "rig.urdf")
     assert checkup.repaired is not None
     assert "decimal_comma" not in {finding.kind for finding in checkup.left}
     lines = zip(broken.split(b"\n"), checkup.repaired.split(b"\n"), strict=True)
