@@ -75,7 +75,7 @@ class Stepper:
         vary: Values that differ from lane to lane, by name, (n,) or (n, size) each; see `rollouts`.
         uncut: True to step across thresholds of effects, with the error of a step that passes one.
         ledger: True to compute `energy_residual` in each step.
-        threads: Number of threads; None for all processors.
+        threads: Number of threads; None for all processors. They pay off from some 10 000 steps, lanes × n, in a call.
 
     Raises:
         QueryError: If an argument is not allowed, a part depends on the time, the controller has no set-point, or steps
