@@ -40,7 +40,7 @@ _AT_REST = 0.01  # [rad] or [m]: largest motion of a joint at rest
 class MomentumObserver(Controller):
     """A sampled controller with an observer of the external torque, updated at each tick: ṙ = K (τ_ext − r).
 
-    The torque is that of the inner controller. It acts from tick to tick, so its integral is exact. In a `Loop`, the
+    The inner controller computes the torque. It acts from tick to tick, so its integral is exact. In a `Loop`, the
     observer receives the measured positions and velocities. `recorded` returns r of a run.
 
     Attributes:
@@ -158,7 +158,7 @@ def external_torque(
 ) -> ExternalTorque:
     """Compute the external torque on the joints from a log, by the generalised momentum observer.
 
-    The sign is that of the joint torque: M a + C v + N = τ + τ_ext. Friction that `effects` leaves out appears in it.
+    Its sign agrees with the joint torque: M a + C v + N = τ + τ_ext. Friction that `effects` leaves out appears in it.
 
     Args:
         arm: The robot.

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import sys
 
-# Modules of required packages; those of extras are imported by `extras.needs`.
+# Modules of required packages; `extras.needs` imports modules of extras.
 _REQUIRED = {
     "PIL", "casadi", "collada", "flint", "llvmlite", "lxml", "matplotlib", "meshcat", "pinocchio", "platformdirs",
     "pydantic", "pydantic_core", "rich", "scipy", "tornado", "trimesh", "typer", "umsgpack", "yourdfpy", "zmq",
 }  # fmt: skip
-# Distributions whose names are not those of their modules.
+# Distributions whose names differ from their modules.
 _DISTRIBUTIONS = {
     "PIL": "pillow", "collada": "pycollada", "flint": "python-flint", "pinocchio": "pin", "pydantic_core": "pydantic",
     "umsgpack": "u-msgpack-python", "zmq": "pyzmq",
