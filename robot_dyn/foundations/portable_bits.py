@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 
 VARIABLE = "ROBOT_DYN_PORTABLE"
 
 
+@cache
 def has_portable_bits() -> bool:
-    """Return True if the machine code of this process is portable, see `codegen.llvm.target`."""
+    """Return True if the machine code of this process is portable, see `codegen.llvm.target`.
+
+    The variable is read once, so that all machine code of a process, and what its runs report, agree.
+    """
     return os.environ.get(VARIABLE) == "1"
