@@ -1,6 +1,7 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.tools.identify.carried import PayloadEstimate as PayloadEstimate
 from robot_dyn.tools.identify.carried import payload as payload
+from robot_dyn.tools.identify.discrimination import Experiment as Experiment
 from robot_dyn.tools.identify.excitation import Excitation as Excitation
 from robot_dyn.tools.identify.excitation import excite as excite
 from robot_dyn.tools.identify.identification import identify as identify
