@@ -95,7 +95,7 @@ def whichever_way(name: str, function: Callable[[], Array], of_arm_inside: str =
 class Motion(Protocol):
     """A motion in symbols, instead of a piecewise polynomial of a reference."""
 
-    def at(self, t: Any, /) -> tuple[Array, Array, Array]:
+    def at(self, t: Symbol, /) -> tuple[Array, Array, Array]:
         """Return position, velocity and acceleration at t."""
         ...
 

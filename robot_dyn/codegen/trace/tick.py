@@ -114,7 +114,7 @@ def _rates(path: str) -> tuple[str, str, str]:
 @final
 @dataclass(frozen=True)
 class _Given:
-    """A motion of which position, velocity and acceleration at the tick are inputs."""
+    """A motion whose position, velocity and acceleration at the tick are inputs."""
 
     t: Any
     values: tuple[Array, Array, Array]

@@ -127,7 +127,7 @@ class CSource(Answer, Value):
 
 
 def c_source(
-    source: rd.Robot | rd.Plant | Controller,
+    system: rd.Robot | rd.Plant | Controller,
     quantities: Iterable[str] | None = None,
     *,
     dtype: DTypeLike = "float64",
@@ -142,7 +142,7 @@ def c_source(
     next states; inputs that a law does not use are left out. The period is a constant; bounds of a plant are not in it.
 
     Args:
-        source: A robot, a plant with smooth or piecewise effects without states, or a controller.
+        system: A robot, a plant with smooth or piecewise effects without states, or a controller.
         quantities: Some of "M", "C", "N", "inverse_dynamics", "forward_dynamics"; by default all of up to eight
             joints, N and inverse dynamics of more. None for a controller.
         dtype: np.float64 for double or np.float32 for float, or its name.
@@ -160,12 +160,12 @@ def c_source(
     if name is not None and not (isinstance(name, str) and name.strip()):
         raise QueryError(f"name must be a text, such as 'ur5', got {shown(name)}")
     dtype = name_of_dtype(dtype)
-    if isinstance(source, Controller):
+    if isinstance(system, Controller):
         if quantities is not None:
             raise QueryError(f"quantities must be None for a controller, got {shown(quantities)}")
-        exported, names = tick_of(source), ("tick",)
+        exported, names = tick_of(system), ("tick",)
     else:
-        exported = equations_of(source)
+        exported = equations_of(system)
         names = chosen(exported, quantities)
     traced = {x: exported.function(x) for x in names}
     programs = {x: program_of(function) for x, function in traced.items()}
@@ -313,15 +313,15 @@ class _Text:
             tolerance = max(_MARGIN * function.difference, _LEAST * UNITS[self.dtype]) * drawn.scale(name)
             parts.append(_of_array(real, f"expected_{name}", states.results(name).reshape(_OF_TEST, -1), self.dtype))
             parts.append(_of_array(real, f"tolerance_{name}", tolerance.reshape(1, -1), self.dtype))
-            inputs = [f"in_{x}[k][0]" if x == "t" else f"in_{x}[k]" for x in function.arguments]
+            arguments = [f"in_{x}[k][0]" if x == "t" else f"in_{x}[k]" for x in function.arguments]
             starts = accumulate(results.values(), initial=0)
-            inputs += ["result" + f" + {start}" * bool(start) for start, _ in zip(starts, results, strict=False)]
+            arguments += ["result" + f" + {start}" * bool(start) for start, _ in zip(starts, results, strict=False)]
             calls.append(
                 _CALL.format(
                     name=name,
                     function=f"{self.prefix}_{name}",
                     entries=sum(results.values()),
-                    inputs=", ".join(inputs),
+                    arguments=", ".join(arguments),
                     real=real,
                 )
             )
@@ -411,7 +411,7 @@ _CALL = """
     worst = 0;
     for (k = 0; k < {states}; k++) {{
         {real} result[{entries}];
-        {function}({inputs}, result);
+        {function}({arguments});
         worst = larger(worst, result, expected_{name}[k], tolerance_{name}[0], {entries});
     }}
     printf("%-18s %.3f of the tolerance\\n", "{name}", (double)worst);

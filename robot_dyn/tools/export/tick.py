@@ -107,7 +107,7 @@ def tick_of(controller: Controller) -> Tick:
 @final
 @dataclass(frozen=True, eq=False)
 class TickStates(States):
-    """Random states and references at the ticks of a controller, and the states z and results of its own code.
+    """Random states and references at the ticks of a controller, and the states z and results by the code in Python.
 
     z follows from tick to tick, from zeros, so that it has values of a run.
 
@@ -154,4 +154,4 @@ class TickStates(States):
 
     def scale(self, name: str) -> np.ndarray:
         largest = np.max(np.abs(self.results(name)), axis=0)
-        return np.maximum(largest, 1e-4 * largest.max() or 1.0)  # entries may be 0 but for rounding
+        return np.maximum(largest, 1e-4 * largest.max() or 1.0)  # entries may be rounding only
