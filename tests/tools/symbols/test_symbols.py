@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
+import shutil
+import subprocess
 import sys
 import warnings
 from importlib import import_module
@@ -15,7 +18,7 @@ import sympy as sp
 
 import robot_dyn as rd
 from robot_dyn.foundations import MissingExtraError, QueryError, RobotDynWarning
-from robot_dyn.tools.symbols import SymbolicEquations, symbols
+from robot_dyn.tools.symbols import SymbolicEquations, align, symbols
 from tests.command import run
 from tests.tools.symbols.in_pinocchio import differences, rate_is_C_plus_its_transpose
 
@@ -105,13 +108,13 @@ def test_equations_nobody_reads_are_refused(letters: Any) -> None:
     assert ("--letters base" in str(refused.value)) == (letters == "file")
 
 
-GRIPPER = """<robot name="gripper"><link name="base"/><link name="arm"/><link name="left"/><link name="right"/>
+HAND = """<robot name="hand"><link name="base"/><link name="arm"/><link name="left"/><link name="right"/>
 <joint name="swing" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
 <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
-<joint name="close" type="revolute"><parent link="arm"/><child link="left"/><axis xyz="1 0 0"/><origin xyz="0 0 1"/>
+<joint name="close" type="KIND"><parent link="arm"/><child link="left"/><axis xyz="1 0 0"/><origin xyz="0 0 1"/>
 <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
-<joint name="follow" type="revolute"><parent link="arm"/><child link="right"/><axis xyz="1 0 0"/><origin xyz="0 1 1"/>
-<mimic joint="close" multiplier="-0.5" offset="0.25"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+<joint name="follow" type="KIND"><parent link="PARENT"/><child link="right"/><axis xyz="1 0 0"/><origin xyz="0 1 1"/>
+<mimic joint="close" multiplier="RATIO" offset="0.25"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
 </robot>""".replace(
     '<link name="arm"/><link name="left"/><link name="right"/>',
     "".join(
@@ -122,9 +125,14 @@ GRIPPER = """<robot name="gripper"><link name="base"/><link name="arm"/><link na
 )
 
 
+def hand(kind: str, parent: str, ratio: str) -> rd.Robot:
+    """An arm with a finger and a second one, on the arm or on the finger, that follows the first."""
+    return rd.Robot.from_text(HAND.replace("KIND", kind).replace("PARENT", parent).replace("RATIO", ratio))
+
+
 def test_mimic_joints_are_locked_with_their_drive() -> None:
     """The remedy of the refusal: at 0.7 of the drive, the follower is at −0.5 · 0.7 + 0.25."""
-    arm = rd.Robot.from_text(GRIPPER)
+    arm = hand("revolute", "arm", "-0.5")
     with pytest.raises(QueryError, match=r"lock=\{'close': 0.0\}"):
         symbols(arm)
     locked = symbols(arm.with_(lock={"close": 0.7}))
@@ -134,13 +142,27 @@ def test_mimic_joints_are_locked_with_their_drive() -> None:
     assert max(differences(locked, np.random.default_rng(4)).values()) < 1e-12
 
 
+@pytest.mark.parametrize("letters", ["file", "base", None])
+@pytest.mark.parametrize(
+    ("kind", "parent", "ratio"),
+    [("revolute", "arm", "-1"), ("revolute", "left", "2"), ("prismatic", "arm", "-1"), ("prismatic", "arm", "0.35")],
+)
+def test_mimic_joints_are_reduced_to_their_drive(kind: str, parent: str, ratio: str, letters: Any) -> None:
+    """q_full = S q + s₀, M = Sᵀ M_full S, …: of Pinocchio's matrices of all joints, at random letters."""
+    reduced = symbols(hand(kind, parent, ratio), letters)
+    assert reduced.n == 2
+    assert rate_is_C_plus_its_transpose(reduced)
+    assert max(reduced.difference.values()) < 1e-14
+    assert max(differences(reduced, np.random.default_rng(5)).values()) < 1e-12
+
+
 def test_the_written_tex_has_one_equation_for_each_entry(tmp_path: Path) -> None:
     """Braces and environments are balanced, and SymPy's reader of LaTeX is not needed: M, C, N are counted."""
     path = tmp_path / "equations.tex"
     import_module("robot_dyn.tools.symbols.command")  # registers it, also where an older version is installed
     done = run("derive", "planar_2r", "-o", path)
     assert done.returncode == 0, done.stderr
-    lines = [line for line in path.read_text().splitlines() if not line.startswith("%")]
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("%")][1:-1]  # in a group
     assert (lines[0], lines[-1]) == (r"\begin{align*}", r"\end{align*}")
     assert [line.split(" &= ")[0] for line in lines[1:-1]] == [
         f"{name}_{{{place}}}" for name, places in (("M", "11 12 22"), ("C", "11 12 21"), ("N", "1 2"))
@@ -151,6 +173,46 @@ def test_the_written_tex_has_one_equation_for_each_entry(tmp_path: Path) -> None
         depths = np.cumsum([(x == "{") - (x == "}") for x in line])
         assert depths.min() == 0 == depths[-1]
         assert line.count(r"\left(") == line.count(r"\right)")
+
+
+def test_sums_are_broken_before_a_term_and_long_products_multiplied_out() -> None:
+    """A (x₁ + … + x₃₀) has 30 terms, each printed once."""
+    a, *x = sp.symbols("a x1:31", real=True)
+    first, *others = align([("y", a * sp.Add(*x))]).splitlines()[1:-1]
+    assert first.startswith("y &= a x_{1} +") and others and all(line.startswith(r"&\quad + a x_") for line in others)
+    printed = re.findall(r"a x_\{(\d+)\}", " ".join([first, *others]))
+    assert sorted(map(int, printed)) == [*range(1, 31)]
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex (Debian: texlive-latex-base)")
+@pytest.mark.parametrize(
+    ("arm", "letters"),
+    [
+        ("planar_2r", "file"),
+        ("cart_pole", "file"),
+        (str(OWN), "file"),
+        pytest.param("ur5", "base", marks=pytest.mark.long),
+    ],
+)
+def test_printed_lines_fit_a_page(arm: str, letters: Any, tmp_path: Path) -> None:
+    """TeX reports each line that is wider than the column, and each page that is too high."""
+    page = symbols(loaded(arm), letters).latex()
+    head = r"\documentclass{article}\usepackage{amsmath}\allowdisplaybreaks\begin{document}"
+    (tmp_path / "page.tex").write_text(head + page + r"\end{document}")
+    done = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "page.tex"], cwd=tmp_path, capture_output=True, timeout=60, check=False
+    )
+    assert done.returncode == 0 and b"Overfull" not in done.stdout
+
+
+def test_latex_of_some_matrices() -> None:
+    equations = symbols(rd.load("planar_2r"))
+    M, C, N = (equations.latex(name).splitlines()[1:-1] for name in "MCN")
+    assert len([*M, *C, *N]) == len(equations.latex().splitlines()) - 2
+    assert all(line.startswith("N_") for line in N)
+    for wrong in ("", "MK", None):
+        with pytest.raises(QueryError):
+            equations.latex(wrong)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(("arm", "letters"), [("mimic_chain", "file"), ("planar_2r", "all"), (None, "file")])

@@ -12,6 +12,7 @@ from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, instance, number_or_dash, reported
 from robot_dyn.queries import of_joint, without_rounding
 from robot_dyn.report import Result
+from robot_dyn.tools.motors.gear import LOSS
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
@@ -105,7 +106,8 @@ class MotorBudget(Result):
         }
         yield _table(needs)
         yield ""
-        yield "at the joint, without losses of motor and gear:"
+        has_loss = any(LOSS in x.of_peak for x in joints)
+        yield f"at the joint, without losses of {'the motor' if has_loss else 'motor and gear'}:"
         speed |= {
             "speed": [x.speed for x in joints],
             "at t [s]": [x.speed_at_s for x in joints],
@@ -127,6 +129,17 @@ class MotorBudget(Result):
                     **{key: [line[key] for _, line in lines] for key in ("torque", "speed", "limit")},
                     "used": [f"{line['used']:.1%}" for _, line in lines],
                     "at t [s]": [line["at_s"] for _, line in lines],
+                }
+            )
+            yield ""
+        if brakes := [(x, x.holding) for x in joints if x.holding]:
+            yield "brakes, and the largest torque of gravity found over the joint limits, below the bound Σ m g r:"
+            yield _table(
+                {
+                    "joint": [x.joint for x, _ in brakes],
+                    "unit": [of_joint("N m", x.type) for x, _ in brakes],
+                    **{key: [getattr(y, key) for _, y in brakes] for key in ("brake", "gravity", "bound")},
+                    "factor": [f"{y.factor:.2f}" for _, y in brakes],
                 }
             )
             yield ""
