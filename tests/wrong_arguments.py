@@ -38,7 +38,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 # Made by the library: their constructors take what it computed.
 RESULTS = {
     "Advice", "AlarmThreshold", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Contact",
-    "Cost", "Estimate", "Excitation", "ExternalTorque", "ExpectedPrecision", "HeldOut", "Identification",
+    "Cost", "Estimate", "Excitation", "Experiment", "ExternalTorque", "ExpectedPrecision", "HeldOut", "Identification",
     "InverseKinematics", "Meaning", "MotorBudget", "Motors", "Parameter", "PathPlan", "PayloadEstimate", "Plan",
     "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State",
     "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations", "Trajectory", "Verdict", "WorkPrecision",
