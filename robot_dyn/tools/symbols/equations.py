@@ -89,12 +89,12 @@ class SymbolicEquations:
         import sympy as sp
 
         q = np.random.default_rng(0).uniform(-2.0, 2.0, (20, self.n))
+        arguments = sp.symbols([*(f"q{k + 1}" for k in range(self.n)), *self.letters], real=True)
         values = [meaning.value for meaning in self.letters.values()]
         result = {}
         for name, matrix, exact in (("M", self.M, self.arm.M(q)), ("N", self.N, self.arm.N(q)[..., None])):
-            symbols = [[sp.Symbol(f"q{k + 1}", real=True) for k in range(self.n)], *_symbols(self.letters)]
-            function = sp.lambdify(symbols, matrix, cse=True)
-            ours = np.array([function(row, *values) for row in q], dtype=float)
+            function = sp.lambdify(arguments, matrix, cse=True)
+            ours = np.array([function(*row, *values) for row in q], dtype=float)
             result[name] = float(np.abs(ours - exact).max() / (np.abs(exact).max() or 1.0))
         return result
 
@@ -201,10 +201,10 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     try:
         results: dict[str, Any] = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
     except (OverflowError, SystemError) as error:
-        cause: BaseException | None = error
-        while isinstance(cause, SystemError):  # products of NumPy's objects raise one from the error of an operator
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__:  # NumPy raises one from the error of an operator
             cause = cause.__cause__
-        if cause is None:
+        if not isinstance(cause, OverflowError):
             raise
         raise _unreadable(f"an intermediate result has {cause}", letters) from None
     for entries in results.values():
@@ -284,9 +284,3 @@ def _parallel(linkage: Linkage) -> tuple[tuple[str, ...], ...]:
         if not any(set(names) & set(group) for group in groups):  # an angle is in one group, also where arms branch
             groups.append(names)
     return tuple(groups)
-
-
-def _symbols(names: Mapping[str, Meaning]) -> list[Any]:
-    import sympy as sp
-
-    return [sp.Symbol(name, real=True) for name in names]

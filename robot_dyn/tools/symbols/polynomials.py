@@ -64,13 +64,13 @@ class Component:
     elevation: Angle
     k: int
 
-    def of(self, azimuth: Any, elevation: Any) -> Any:
+    def _of(self, azimuth: Any, elevation: Any) -> Any:
         """Return the component from the angles as numbers of an arithmetic."""
         across = np.cos(elevation)
         return (across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation))[self.k]
 
     def __float__(self) -> float:
-        return float(self.of(float(self.azimuth), float(self.elevation)))
+        return float(self._of(float(self.azimuth), float(self.elevation)))
 
 
 @final
@@ -233,7 +233,7 @@ class Polynomials(Arithmetic):
         if isinstance(literal, Angle):
             return self._turn(literal)
         if isinstance(literal, Component):
-            return literal.of(self._turn(literal.azimuth), self._turn(literal.elevation))
+            return literal._of(self._turn(literal.azimuth), self._turn(literal.elevation))
         return literal if isinstance(literal, Polynomial | Turn) else self._constant(literal)
 
     def _constant(self, x: str | SupportsFloat) -> Polynomial:

@@ -97,7 +97,11 @@ def _lettered(equations: SymbolicEquations, values: dict[str, float]) -> tuple[T
 
     def number(literal: Any) -> float:
         if isinstance(literal, Component):
-            return float(literal.of(number(literal.azimuth), number(literal.elevation)))
+            angles = {
+                name: replace(x, value=number(x))
+                for name, x in (("azimuth", literal.azimuth), ("elevation", literal.elevation))
+            }
+            return float(replace(literal, **angles))
         return float(replace(literal, value=every[name]) if (name := getattr(literal, "name", "")) else literal)
 
     return tree, number
