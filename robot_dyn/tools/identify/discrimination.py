@@ -81,10 +81,11 @@ class Experiment(Value):
         rest = f"neither poses nor motions tell apart: {same}; weigh or measure the parts" if same else ""
         if len(self.undecided) == len(self.pairs):
             return rest
-        best = np.maximum(self.by_poses, self.by_motion) >= DECISIVE
-        by = "poses" if (self.by_poses[best] >= DECISIVE).all() else "reference"
-        what = f"torques in {len(self.poses)} poses at rest" if by == "poses" else "a log of another motion"
-        return f"to decide: {what}, see verdict.experiment.{by}{f'; {rest}' if rest else ''}"
+        seen = np.maximum(self.by_poses, self.by_motion) >= DECISIVE
+        ways = {"a log of the motion verdict.experiment.reference": self.by_motion}
+        ways[f"torques in the {len(self.poses)} poses at rest verdict.experiment.poses"] = self.by_poses
+        enough = [way for way, x in ways.items() if (x[seen] >= DECISIVE).all()] or [" and ".join(ways)]
+        return f"to decide: {', or '.join(enough)}{f'; {rest}' if rest else ''}"
 
 
 def experiment_of(
