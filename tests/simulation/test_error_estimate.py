@@ -16,7 +16,7 @@ from robot_dyn.simulation.results.error_estimate import no_estimate
 from robot_dyn.simulation.run.recording import Path
 from robot_dyn.simulation.run.runner import Runner
 from tests.campaigns.estimates.switching import scene_of_all
-from tests.long import long
+from tests.long import long, stress
 
 DOUBLE = rd.load("planar_2r")
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
@@ -161,7 +161,7 @@ def test_the_estimate_at_a_time_is_the_largest_up_to_it() -> None:
         whole.at(["soon"])
 
 
-@pytest.mark.parametrize("index", [1, 3, 6, *long([0, 2, 4, 5, 7])])
+@pytest.mark.parametrize("index", [1, 3, 6, *long([2, 4]), *stress([0, 5, 7])])
 def test_the_largest_error_is_finite_where_the_estimate_holds_to_the_end_of_the_run(index: int) -> None:
     run = rd.simulate(scene_of_all(5, index).setup)
     assert run.error is not None

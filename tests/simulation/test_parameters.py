@@ -12,7 +12,7 @@ from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import EffectError, QueryError, TraceError, eigh, tanh
 from robot_dyn.model import completed
 from robot_dyn.simulation.compiled import cache
-from tests.long import long
+from tests.long import long, stress
 
 ARM = rd.load("planar_2r")
 TIP = ARM.frame_names[-1]
@@ -215,7 +215,7 @@ UR5 = completed(rd.load("ur5"))[0]
 START = np.array([0.3, -0.9, 1.2, -0.6, 0.8, 0.2])
 
 
-@pytest.mark.parametrize("turn", ["free", *long(["kept", "turning"])])
+@pytest.mark.parametrize("turn", ["free", *long(["turning"]), *stress(["kept"])])
 def test_operational_space_is_compiled(turn: str) -> None:
     """With the orientation free, kept and turning by 2 rad; the eigenvectors are those of another method."""
     g = UR5.placement(START, "tool0")

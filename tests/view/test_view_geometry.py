@@ -12,7 +12,7 @@ from robot_dyn.description import description
 from robot_dyn.view import drawing
 from tests.browser import opened
 from tests.drawings import WRITTEN_FOR_GAZEBO, Z_UP, box, boxes, stated_boxes
-from tests.long import long
+from tests.long import long, stress
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
@@ -106,7 +106,7 @@ def test_every_link_with_a_visual_is_drawn(name: str) -> None:
         assert all(0 <= x <= 1 for x in piece.rgba)
 
 
-@pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10), ("kinova", 9), ("twodofs", 1)])])
+@pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10)]), *stress([("kinova", 9), ("twodofs", 1)])])
 def test_each_link_fills_the_box_of_its_pieces(browser, name: str, least: int) -> None:
     """In the browser's scene, placed by Pinocchio; single precision in a scene of about 1 m: 2e-6."""
     arm = rd.load(name)

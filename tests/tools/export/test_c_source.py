@@ -24,7 +24,7 @@ from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
 from tests.command import ROOT, run
-from tests.long import long
+from tests.long import long, stress
 from tests.promised import check_document
 from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
@@ -71,7 +71,7 @@ class Written:
 
 
 @needs_cc
-@pytest.mark.parametrize("name", [*QUICK, *long(OTHERS)])
+@pytest.mark.parametrize("name", [*QUICK, *long(OTHERS[::5]), *stress(name for i, name in enumerate(OTHERS) if i % 5)])
 def test_robots_of_the_catalog_pass_their_self_test(name: str, tmp_path: Path) -> None:
     """Built with all warnings as errors. The tolerance is 16 times the largest difference at 10 000 states."""
     try:
