@@ -67,6 +67,8 @@ from robot_dyn.foundations.files import why as why
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError as NotPositiveDefiniteError
 from robot_dyn.foundations.linear_algebra import cholesky_solve as cholesky_solve
 from robot_dyn.foundations.linear_algebra import eigh as eigh
+from robot_dyn.foundations.local_ascent import largest_found as largest_found
+from robot_dyn.foundations.local_ascent import search_box as search_box
 from robot_dyn.foundations.public import public_names as public_names
 from robot_dyn.foundations.result import UNREPORTED as UNREPORTED
 from robot_dyn.foundations.result import json_text as json_text
@@ -97,6 +99,7 @@ from robot_dyn.foundations.validate import one_state as one_state
 from robot_dyn.foundations.validate import shaped as shaped
 from robot_dyn.foundations.validate import truth as truth
 from robot_dyn.foundations.values import OnFirstUse as OnFirstUse
+from robot_dyn.foundations.values import ReadOnly as ReadOnly
 from robot_dyn.foundations.values import Value as Value
 from robot_dyn.foundations.values import read_only as read_only
 from robot_dyn.foundations.values import several as several
