@@ -21,7 +21,7 @@ from tests.campaigns.estimates.scenes import FAMILIES, arms
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard.stiff_motion import stop
-from tests.long import long, stress
+from tests.long import long, stress, third
 from tests.own_method import OwnImplicit
 from tests.user_parts import Push
 
@@ -132,7 +132,7 @@ def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
     assert exact > 1e3 * run.error.at(run.error.until_s)
 
 
-@pytest.mark.parametrize(("seed", "index"), [(31, 32), *long([(20261126, 230), (20261128, 283), (31, 46), (41, 3)])])
+@pytest.mark.parametrize(("seed", "index"), [(31, 32), *third([(20261126, 230), (20261128, 283), (31, 46), (41, 3)])])
 def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
     """A swing, bristles and stops; longer steps show another order, or by chance that one, or magnify rounding."""
     judged = judge(seed, index, scene_of_all)

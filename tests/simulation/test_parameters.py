@@ -12,7 +12,7 @@ from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import EffectError, QueryError, TraceError, eigh, tanh
 from robot_dyn.model import completed
 from robot_dyn.simulation.compiled import cache
-from tests.long import long, stress
+from tests.long import long, stress, third
 
 ARM = rd.load("planar_2r")
 TIP = ARM.frame_names[-1]
@@ -84,7 +84,7 @@ def test_another_structure_is_compiled() -> None:
     [
         (f"model.payload_mass:{TIP}", np.array([0.1, 2.5])),
         ("kp", np.array([[30.0, 20.0], [70.0, 80.0]])),
-        *long(
+        *third(
             [
                 ("external_wrench.wrench", np.array([[1.0, 2, 3, 0.4, 0.5, 0.6], [3.0, 1, -2, 0.1, 0.2, 0.9]])),
                 ("gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),

@@ -24,7 +24,7 @@ from robot_dyn.simulation.run.fixed_steps import samples_at_most
 from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.time_loop import time_loop
 from tests.campaigns.estimates.scenes import arms
-from tests.long import long, stress
+from tests.long import long, stress, third
 
 ARM = rd.load("planar_2r")
 PLAIN = [name for name in FIXED_STEP if method(name).plain]
@@ -171,7 +171,7 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     [
         ("RK4", CONTINUOUS),
         ("GaussLegendre4", SAMPLED),
-        *long((name, SAMPLED) for name in PLAIN if name != "GaussLegendre4"),
+        *third((name, SAMPLED) for name in PLAIN if name != "GaussLegendre4"),
     ],
 )
 def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control.Controller) -> None:
