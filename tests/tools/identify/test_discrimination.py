@@ -11,8 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.control import PiecewisePolynomial, Samples
-from robot_dyn.tools.identify import Experiment, FourierSeries, Identification, identify
-from robot_dyn.tools.identify.discrimination import DECISIVE, experiment_of
+from robot_dyn.tools.identify import DECISIVE, Experiment, FourierSeries, Identification, experiment_of, identify
 
 ARM = rd.load("planar_2r")
 VISCOUS, COULOMB = np.array([0.05, 0.03]), np.array([0.05, 0.03])
