@@ -5,8 +5,8 @@
     casadi        a quantity as a casadi.Function; parameter_values: values of its argument p
     discretise    A and B of a sampled model with an input delay, a SampledModel
 
-docs/how_to/ has examples (c_for_a_controller, optimal_control, observers_and_lqg), and README.md lists the files of
-this folder.
+docs/how_to/ has examples (c_for_a_controller, controller_in_c, optimal_control, observers_and_lqg), and README.md lists
+the files of this folder.
 """
 
 from robot_dyn.foundations import public_names

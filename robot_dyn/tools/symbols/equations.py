@@ -11,7 +11,7 @@ import numpy as np
 
 from robot_dyn import Robot
 from robot_dyn.codegen.trace.base_parameters import regrouped
-from robot_dyn.foundations import FLOAT64, QueryError, first_moment, needs, shown
+from robot_dyn.foundations import FLOAT64, QueryError, first_moment, hat, needs, shown
 from robot_dyn.lagrange import FORMULAS, Linkage, Pose, linkage_of, tree_of
 from robot_dyn.tools.symbols.fourier import expression, shortest
 from robot_dyn.tools.symbols.latex import align
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
 READABLE = 600  # terms of M and N: some four pages
+BASE = ("M", "MX", "MY", "MZ", *map(str.upper, MOMENTS))  # letters of the base parameters of a body
 SMALL = 1e-12  # relative to the largest parameter of a kind: rounding of the regrouping
 
 
@@ -173,10 +174,8 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     tree = readable(tree_of(arm.description, arm.edits))
     lettering = Lettering(named=letters == "file", with_g=letters is not None)
     lettered = lettering.tree(tree, arm.joint_names)
-    meanings = dict(lettering.letters)
-    inertias = _base_inertias(arm) if letters == "base" else {}
-    for values, _ in inertias.values():
-        meanings |= values
+    parameters = _base_parameters(arm) if letters == "base" else {}
+    meanings = dict(lettering.letters) | parameters
     coordinates = tuple(f"q{k + 1}" for k in range(len(arm.joint_names)))
     rates = tuple(f"v{k + 1}" for k in range(len(arm.joint_names)))
     scalars = tuple(name for name in meanings if name not in lettering.angles)
@@ -186,10 +185,12 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     ring = Polynomials((*scalars, *rates, *sliding), (*turning, *lettering.angles))
     linkage = linkage_of(lettered, arm.joint_names, ring)
     if letters == "base":
-        links = {
-            name: (i, Pose(np.eye(3, dtype=object), np.zeros(3, dtype=object)), ring.array(inertias[name][1]))
-            for i, name in enumerate(body.joint for body in linkage.bodies)
-        }
+        numbers, identity = (
+            body_numbers(tree, arm.joint_names),
+            Pose(np.eye(3, dtype=object), np.zeros(3, dtype=object)),
+        )
+        names = [body.joint for body in linkage.bodies]
+        links = {name: (i, identity, _inertia(parameters, numbers[name], ring)) for i, name in enumerate(names)}
         linkage = replace(linkage, links=links)
     q = np.empty(len(coordinates), dtype=object)
     q[:] = [
@@ -236,8 +237,8 @@ def _part(name: str) -> str:
     return name.partition("_")[0] if name.startswith("I") else name
 
 
-def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[Any]]]]:
-    """Return the letters of each body's base parameters, and its 𝓜 in them, by joint.
+def _base_parameters(arm: Robot) -> dict[str, Meaning]:
+    """Return the base parameters of all bodies, by their letters.
 
     The letters follow Gautier and Khalil (1990): M mass, MX first moment, XX second moment in the joint's frame.
     """
@@ -248,23 +249,21 @@ def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[
     largest = np.abs(inertias).max(axis=0)
     small = SMALL * np.array([[largest[:3, :3].max()] * 3 + [largest[:3, 3:].max()] * 3] * 3
                              + [[largest[:3, 3:].max()] * 3 + [largest[3:, 3:].max()] * 3] * 3)  # fmt: skip
-    result = {}
+    result: dict[str, Meaning] = {}
     indices = body_numbers(tree, arm.joint_names)
     for body, inertia in zip(numbers.bodies, np.where(np.abs(inertias) > small, inertias, 0.0), strict=True):
-        k = indices[body.joint]
-        values = {f"M{k}": inertia[0, 0]}
-        values |= dict(zip((f"MX{k}", f"MY{k}", f"MZ{k}"), first_moment(inertia), strict=True))
-        pairs = dict(zip(MOMENTS, zip(*np.triu_indices(3), strict=True), strict=True))
-        values |= {f"{name.upper()}{k}": inertia[3 + i, 3 + j] for name, (i, j) in pairs.items()}
-        M, X, Y, Z, XX, XY, XZ, YY, YZ, ZZ = (Letter(name, x) if x else 0 for name, x in values.items())
-        x, y, z = (replace(c, sign=-1) if isinstance(c, Letter) else 0 for c in (X, Y, Z))  # negative
-        rows = [
-            [M, 0, 0, 0, Z, y], [0, M, 0, z, 0, X], [0, 0, M, Y, x, 0],
-            [0, z, Y, XX, XY, XZ], [Z, 0, x, XY, YY, YZ], [y, X, 0, XZ, YZ, ZZ],
-        ]  # fmt: skip
-        where = f"base parameter of joint {body.joint!r}"
-        result[body.joint] = {name: Meaning(float(x), where) for name, x in values.items() if x}, rows
+        values = (inertia[0, 0], *first_moment(inertia), *inertia[3:, 3:][np.triu_indices(3)])
+        where, k = f"base parameter of joint {body.joint!r}", indices[body.joint]
+        result |= {f"{name}{k}": Meaning(float(x), where) for name, x in zip(BASE, values, strict=True) if x}
     return result
+
+
+def _inertia(parameters: Mapping[str, Meaning], k: int, ring: Polynomials) -> np.ndarray:
+    """Return 𝓜 of body k in the letters of its base parameters."""
+    names = [f"{name}{k}" for name in BASE]
+    M, X, Y, Z, XX, XY, XZ, YY, YZ, ZZ = ring.array([Letter(name) if name in parameters else 0 for name in names])
+    c, J = hat(np.array([X, Y, Z])), np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+    return np.block([[M * np.eye(3, dtype=object), -c], [c, J]])
 
 
 def _parallel(linkage: Linkage) -> tuple[tuple[str, ...], ...]:

@@ -9,7 +9,7 @@ from typing import Any
 WIDTH = 72  # of a line in characters, indices included: 345 pt, the column of `article`
 
 
-def align(entries: Iterable[tuple[str, Any]]) -> str:
+def align(entries: Iterable[tuple[str, object]]) -> str:
     """Return an align* environment of amsmath with an equation for each pair of a left and a right side.
 
     A sum that is wider than a line is broken before a term; a product with a sum that is wider is multiplied out first.

@@ -24,7 +24,7 @@ from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, StatesOfArm, bound, box_of
 from tests.command import ROOT, run
-from tests.long import long
+from tests.long import third
 from tests.promised import check_document
 from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
@@ -71,7 +71,7 @@ class Written:
 
 
 @needs_cc
-@pytest.mark.parametrize("name", [*QUICK, *long(OTHERS)])
+@pytest.mark.parametrize("name", [*QUICK, *third(OTHERS)])
 def test_robots_of_the_catalog_pass_their_self_test(name: str, tmp_path: Path) -> None:
     """Built with all warnings as errors. The tolerance is 16 times the largest difference at 10 000 states."""
     try:
@@ -88,7 +88,7 @@ def test_robots_of_the_catalog_pass_their_self_test(name: str, tmp_path: Path) -
 
 
 @needs_cc
-@pytest.mark.parametrize("name", ["pendulum", *long(sorted(set(QUICK) - SLOW_IN_FLOAT - {"pendulum"}))])
+@pytest.mark.parametrize("name", ["pendulum", *third(sorted(set(QUICK) - SLOW_IN_FLOAT - {"pendulum"}))])
 def test_robots_in_float_have_no_operation_in_double(name: str, tmp_path: Path) -> None:
     """`library` makes promotions to double errors. Some hundred operations of 6e-8 add up to less than 1e-6."""
     source = c_source(loaded(name), dtype="float32")

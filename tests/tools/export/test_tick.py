@@ -18,7 +18,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import ExportError, QueryError
 from robot_dyn.model import completed
 from robot_dyn.tools.export import CSource, c_source
-from tests.command import run
+from tests.command import ROOT, run
 from tests.promised import check_document
 from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
@@ -188,6 +188,15 @@ def test_plant_and_controller_in_c_give_the_librarys_run(law: str, tmp_path: Pat
     assert np.abs(y[-1, :6] - START).max() > 0.4  # it moved
     last = states_at_ticks(ran)[PERIODS]
     assert np.abs(z[: len(last)] - last).max(initial=0.0) < 1e-12 * KP.max()  # z is the integral of 3 kp e
+
+
+def test_c_of_the_page_compiles(tmp_path: Path) -> None:
+    """The firmware of docs/how_to/controller_in_c.md, with a PID in float."""
+    exported("PID", "float32").write(tmp_path)
+    page = (ROOT / "docs" / "how_to" / "controller_in_c.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```c\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (tmp_path / "firmware.c").write_text(block)
+    call("cc", *STRICT, "-c", tmp_path / "firmware.c", "-o", tmp_path / "firmware.o")
 
 
 def test_gains_may_change_without_a_new_export(tmp_path: Path) -> None:
