@@ -36,6 +36,7 @@ from robot_dyn.tools.identify.physical import links_of as links_of
 from robot_dyn.tools.identify.physical import nearest_bodies as nearest_bodies
 from robot_dyn.tools.identify.physical import nearest_possible as nearest_possible
 from robot_dyn.tools.identify.physical import pseudo_inertia as pseudo_inertia
+from robot_dyn.tools.identify.physical import whitening as whitening
 from robot_dyn.tools.identify.regression import Fit as Fit
 from robot_dyn.tools.identify.regression import Rows as Rows
 from robot_dyn.tools.identify.regression import fit as fit

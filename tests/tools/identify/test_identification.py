@@ -31,6 +31,7 @@ from robot_dyn.tools.identify import (
     nearest_possible,
     pseudo_inertia,
     read_log,
+    whitening,
 )  # fmt: skip
 from tests.command import spawn
 from tests.tools.identify import logs
@@ -143,6 +144,15 @@ def test_the_nearest_bodies_are_those_of_the_log_cholesky_parametrisation(spread
     assert np.allclose(found, bodies(referee.x.reshape(-1, 10)), atol=tolerance)
     edge = min(np.linalg.eigvalsh(pseudo_inertia(body))[0] for body in found.reshape(-1, 10)) < 2 * MARGIN
     assert edge == (spread > 0.5)
+
+
+def test_a_covariance_is_whitened_also_near_a_singular_one() -> None:
+    """L Σ Lᵀ = 1; of two equal parameters of variance 1, a common shift by 1 has the distance 1."""
+    A = np.random.default_rng(0).normal(size=(5, 5)) * [1e-6, 1.0, 1e3, 1.0, 1.0]
+    L = whitening(A.T @ A)
+    assert np.allclose(L @ (A.T @ A) @ L.T, np.eye(5), atol=1e-9)
+    L = whitening(np.ones((2, 2)))
+    assert np.sum((L @ [1.0, 1.0]) ** 2) == pytest.approx(1.0)
 
 
 def test_links_and_the_rest_of_their_bodies_make_up_the_arm() -> None:
