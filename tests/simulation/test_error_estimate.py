@@ -16,6 +16,7 @@ from robot_dyn.simulation.results.error_estimate import no_estimate
 from robot_dyn.simulation.run.recording import Path
 from robot_dyn.simulation.run.runner import Runner
 from tests.campaigns.estimates.switching import scene_of_all
+from tests.campaigns.hard.nonsmooth_tutorials import twisting
 from tests.long import long, stress, third
 
 DOUBLE = rd.load("planar_2r")
@@ -204,3 +205,12 @@ def test_companions_that_end_before_their_first_shared_state_show_nothing(method
     monkeypatch.setattr(Runner, "run", lambda *_: replace(run, shared=nothing))
     found = estimate(of, run, Runner(choose(of)))
     assert found.verdict is Verdict.NONE and found.largest == np.inf
+
+
+@pytest.mark.long
+def test_a_run_that_ends_where_events_accumulate_has_an_estimate_of_its_true_error() -> None:
+    """Companions there take steps at rounding; one that Newton's iteration had made longer was tried for ever."""
+    motion = twisting().motion
+    run = rd.simulate(motion.setup, method="DOP853", record_every_s=0.1)
+    assert run.outcome.reason == rd.simulation.Reason.EVENTS_ACCUMULATE
+    assert np.abs(run.q - motion.exact(run.t)).max() <= 10 * run.error.largest <= 1e-6

@@ -32,7 +32,7 @@ def export_c(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Write the equations of an arm or a scene, or a controller, as C.
+    """Write an arm, a scene or its controller as C.
 
     The folder then holds a header, a source file, CMakeLists.txt and a self-test for ctest.
 

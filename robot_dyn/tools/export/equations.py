@@ -77,6 +77,7 @@ class Equations(Exported):
         return self.bound(name, trace.function, names, [result_name(name)], ("t", "p"), is_open=is_open)
 
     def check(self, name: str, function: ca.Function, program: Program, dtype: str) -> None:
+        """Compare a program with the independent implementation that kernels are checked with."""
         engine, arguments = self.engine(name), function.name_in()
         state = {key: x.astype(dtype).astype(float) for key, x in engine.self_check.states().items()}
         theirs, effects = engine.truth(name, state)

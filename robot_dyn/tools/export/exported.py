@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen import Parameter, Program
+from robot_dyn.codegen import Parameter
 
 
 class Exported(ABC):
@@ -55,10 +55,6 @@ class Exported(ABC):
     @abstractmethod
     def function(self, name: str, *, is_open: bool = True) -> ca.Function:
         """Return a function by name, with the inputs and results of the C function; p is bound unless `is_open`."""
-
-    @abstractmethod
-    def check(self, name: str, function: ca.Function, program: Program, dtype: str) -> None:
-        """Raise a SelfCheckError if a program differs from an independent implementation."""
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

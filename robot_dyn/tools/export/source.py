@@ -172,7 +172,8 @@ def c_source(
     for quantity, program in programs.items():
         if len(program) > _LONGEST:
             raise ExportError(f"{quantity} has {len(program)} instructions, more than {_LONGEST}; leave it out")
-        exported.check(quantity, traced[quantity], program, dtype)
+        if isinstance(exported, Equations):
+            exported.check(quantity, traced[quantity], program, dtype)
     states = _states(exported, dtype, exported.states)
     functions = tuple(_function(states, x, programs[x], tuple(traced[x].name_in())) for x in names)
     renamed: dict[str, str] = {}
@@ -280,7 +281,8 @@ class _Text:
             real=_real(self.dtype),
             errors=_ERRORS[kind].format(states=exported.states),
             notes="".join(f" * {_comment(x)}.\n" for x in notes),
-            math=", ".join(x + "f" * (self.dtype == "float32") for x in self.math) or "none",
+            math=(", ".join(x + "f" * (self.dtype == "float32") for x in self.math) or "none")
+            + " (GCC may join sine and cosine to sincos)" * ("sin" in self.math),
             table="\n".join(table),
             constants="\n".join(f"    {key} = {value}, /* {_comment(text)} */" for key, value, text in constants),
             values=values,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final
@@ -18,7 +18,7 @@ from robot_dyn.foundations import ExportError, TraceError, with_values
 from robot_dyn.tools.export.exported import Exported
 from robot_dyn.tools.export.rounding import FASTEST, MOST_ACCELERATION, UNITS, States, limits
 
-_CHECKED, _LARGEST = 200, 1e6  # states of the check, and its largest difference in rounding units
+_LARGEST = 1e6  # rounding units; a larger difference is an error of the trace
 
 
 @final
@@ -67,15 +67,6 @@ class Tick(Exported):
         traced = self.trace.function
         names = traced.name_in()
         return self.bound(name, traced, names, traced.name_out(), {*names} - {"q", "v"}, is_open=is_open)
-
-    def check(self, name: str, function: ca.Function, program: Program, dtype: str) -> None:
-        states = TickStates(dtype, _CHECKED, self)
-        difference = states.largest_error(name, program, function.name_in())
-        if not difference < _LARGEST * UNITS[dtype]:
-            raise SelfCheckError(
-                f"the tick of {self.controller.name} in C differs from that in Python by {difference:.1e}; if its law"
-                " jumps, write it with np.where, else report this as a bug"
-            )
 
 
 def tick_of(controller: Controller) -> Tick:
@@ -151,6 +142,15 @@ class TickStates(States):
 
     def results(self, name: str) -> np.ndarray:
         return np.concatenate([self.inputs["u"], self.inputs["z_next"]], axis=1)
+
+    def largest_error(self, name: str, program: Program, arguments: Sequence[str]) -> float:
+        difference = super().largest_error(name, program, arguments)
+        if not difference < _LARGEST * UNITS[self.dtype]:
+            raise SelfCheckError(
+                f"the tick of {self.tick.controller.name} in C differs from that in Python by {difference:.1e}; if its"
+                " law jumps, write it with np.where, else report this as a bug"
+            )
+        return difference
 
     def scale(self, name: str) -> np.ndarray:
         largest = np.max(np.abs(self.results(name)), axis=0)

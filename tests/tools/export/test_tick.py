@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.codegen import SelfCheckError
 from robot_dyn.foundations import ExportError, QueryError
 from robot_dyn.model import completed
 from robot_dyn.tools.export import CSource, c_source
@@ -279,6 +280,8 @@ def test_laws_that_c_cannot_have_are_refused() -> None:
         c_source(Ahead())
     with pytest.raises(ExportError, match="float"):
         c_source(control.ControlLaw(lambda t, q, v: np.array([float(x) for x in q]), 6))
+    with pytest.raises(SelfCheckError, match="differs"):  # other numbers than symbols
+        c_source(control.ControlLaw(lambda t, q, v: q + isinstance(q[0], float), 6))
     with pytest.raises(QueryError, match="quantities"):
         c_source(PD, ["M"])
     assert c_source(replace(delayed, measurement_delay_periods=0.0)).functions
