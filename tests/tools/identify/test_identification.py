@@ -14,22 +14,24 @@ from scipy.optimize import least_squares
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
 from robot_dyn.tools.identify import (
+    MARGIN,
     Fit,
     Identification,
     LogError,
     Rows,
     Signals,
+    distance,
     estimate,
     fit,
     identify,
     links_of,
     low_pass,
     model_of,
+    nearest_bodies,
     nearest_possible,
     pseudo_inertia,
     read_log,
 )  # fmt: skip
-from robot_dyn.tools.identify.physical import MARGIN, distance, nearest_bodies
 from tests.command import spawn
 from tests.tools.identify import logs
 
