@@ -144,7 +144,7 @@ class SymbolicEquations:
     def _matrix(self, name: str) -> sp.Matrix:
         import sympy as sp
 
-        ring = next(x for x in self.polynomials["M"].flat if not isinstance(x, int)).ring
+        ring = self.polynomials["M"].flat[0].ring
         names = tuple(part if (part := _part(x)) in self.letters else x for x in ring.names)
         entries = self._terms[name]
         rows = entries.reshape(self.n, -1)
@@ -208,6 +208,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
         if not isinstance(cause, OverflowError):
             raise
         raise _unreadable(f"an intermediate result has {cause}", letters) from None
+    results = {name: ring.array(entries) for name, entries in results.items()}  # zeros of trees are integers of NumPy
     for entries in results.values():
         entries.setflags(write=False)
     used = _occurring(meanings, results)
@@ -225,7 +226,7 @@ def _unreadable(size: str, letters: str | None) -> QueryError:
 
 def _occurring(letters: Mapping[str, Meaning], polynomials: Mapping[str, np.ndarray]) -> dict[str, Meaning]:
     """Return the letters that occur, with I2 where one moment of a part does."""
-    values = [x for entries in polynomials.values() for x in entries.flat if not isinstance(x, int)]
+    values = [x for entries in polynomials.values() for x in entries.flat]
     occurring = {*values[0].ring.names}.difference(set.intersection(*(set(x.value.unused_gens()) for x in values)))
     used = {name: meaning for name, meaning in letters.items() if occurring & {name, f"s_{name}", f"c_{name}"}}
     parts = [_part(name) for name in used]

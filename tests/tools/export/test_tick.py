@@ -301,5 +301,3 @@ def test_the_command_writes_the_tick_of_a_scene(tmp_path: Path) -> None:
         "pd_controller.h", "pd_controller.c", "pd_self_test.c", "CMakeLists.txt",
     }  # fmt: skip
     assert run("export-c", "ur5", "--controller", "-o", tmp_path / "out").returncode != 0
-    scene.write_text('robot = "planar_2r"\nduration_s = 1.0\n')
-    assert "control" in run("export-c", scene, "--controller", "-o", tmp_path / "out").stderr

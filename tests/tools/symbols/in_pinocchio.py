@@ -45,7 +45,7 @@ def differences(equations: SymbolicEquations, rng: np.random.Generator, states: 
 def rate_is_C_plus_its_transpose(equations: SymbolicEquations) -> bool:
     """Return True if Ṁ = Σ ∂M/∂q_k v_k and C + Cᵀ are the same polynomials: with ds = c, dc = −s."""
     M, C = equations.polynomials["M"], equations.polynomials["C"]
-    ring = next(x.ring for x in M.flat if not isinstance(x, int))
+    ring = M[0, 0].ring
     rate = 0 * M
     for k in range(equations.n):
         q, v = f"q{k + 1}", ring.generator(f"v{k + 1}")

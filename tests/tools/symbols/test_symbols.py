@@ -24,7 +24,7 @@ from tests.tools.symbols.in_pinocchio import differences, rate_is_C_plus_its_tra
 
 OWN = Path(__file__).with_name("spatial_3r.urdf")
 ARMS = [  # a fifth of those that are printed; the others are in tests.campaigns.symbols
-    ("planar_2r", "file"), ("cart_pole", "file"), ("quadruped", "base"), ("flyball_governor", "base"),
+    ("planar_2r", "file"), ("cart_pole", "file"), ("iris", "file"), ("quadruped", "base"), ("flyball_governor", "base"),
     (str(OWN), "file"), (str(OWN), None),
 ]  # fmt: skip
 LONG = [("finger_edu", "file"), ("bolt", "file"), ("hextilt_flying_arm_5", "base"), ("b1", "base"), ("ur5", "base")]
