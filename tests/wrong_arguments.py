@@ -306,7 +306,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
-        call(rd.tools.export.c_source, arm_or_plant=robot, quantities=["N"], dtype="float32", name="arm"),
+        call(rd.tools.export.c_source, system=robot, quantities=["N"], dtype="float32", name="arm"),
         call(rd.tools.export.c_source(robot, ["N"]).write, folder=folder / "c", force=True),
         call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
         call(rd.tools.export.parameter_values, plant=plant),
