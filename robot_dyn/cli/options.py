@@ -129,7 +129,7 @@ class Results:
     """Options for the result of a command: a figure, a table, text or JSON.
 
     Options:
-        output (PLOT.png): Write the figure, as .png, .svg or .pdf.
+        output (PLOT.png): Write the figure (.png, .svg, .pdf) or a page (.html).
         csv (TABLE.csv): Write the rows as a CSV table.
     """
 
@@ -142,22 +142,22 @@ class Results:
     def files(self, of: type, *inputs: str | None) -> list[Path]:
         """Return the paths to write a figure and a table of a class of results to, checked before the work is done."""
         from robot_dyn.report.figure import ResultError
-        from robot_dyn.report.result import table_kind
+        from robot_dyn.report.result import REPORT, table_kind
         from robot_dyn.view.plots.pictures import PICTURES
 
         if self.dark and not self.output:
             raise QueryError("--dark applies to a figure: add --output PLOT.png, or remove --dark")
         read, paths = [path for path in inputs if path and os.path.isfile(path)], []
-        for path, kinds in ((self.output, PICTURES), (self.csv, table_kind(of))):
+        for path, kinds in ((self.output, (*PICTURES, REPORT)), (self.csv, table_kind(of))):
             if path:
                 paths.append(target(path, kinds, ResultError, [*read, *paths], self.force))
         return paths
 
-    def give(self, result: Any, paths: Iterable[Path], drawn: Any = None, **more: Any) -> None:
-        """Write a result, or the one that is `drawn`, and show it with more answers by key."""
+    def give(self, result: Any, paths: Iterable[Path], drawn: Any = None, first: str = "", **more: Any) -> None:
+        """Write a result, or the one that is `drawn`, and show it after a first line, with more answers by key."""
         theme = "dark" if self.dark else "light"
         writes = [partial((drawn or result).save, path, theme=theme) for path in paths]
-        show(result, as_json=self.as_json, more=more, writes=writes)
+        show([first, "", result] if first else result, document=result, as_json=self.as_json, more=more, writes=writes)
 
 
 FILE_AS_STATED, AS_STATED = FileOptions(), RobotOptions()  # defaults of the parameters of commands

@@ -195,6 +195,11 @@ class TorqueSpeedLimit(Bound):
         middle, half = self._range(v)
         return (u - middle) / half
 
+    @property
+    def limits_joint(self) -> np.ndarray:
+        """True for joints with a limit, (n,); of an effect in a plant."""
+        return np.isfinite(self._tables[4])
+
     def _range(self, v: Array) -> tuple[Array, Array]:
         """Return middle and half width of the allowed actuation, which is at least half of the peak."""
         peak, corners, slopes, floors, *_ = self._tables

@@ -19,6 +19,7 @@ from robot_dyn.foundations.coefficients import check_coefficients as check_coeff
 from robot_dyn.foundations.coefficients import coefficient as coefficient
 from robot_dyn.foundations.coefficients import declared as declared
 from robot_dyn.foundations.coefficients import with_values as with_values
+from robot_dyn.foundations.display import document as document
 from robot_dyn.foundations.display import drawable as drawable
 from robot_dyn.foundations.display import inline as inline
 from robot_dyn.foundations.display import legend as legend

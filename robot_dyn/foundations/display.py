@@ -28,6 +28,13 @@ _LONGEST = 32  # largest number of characters in the name of a row
 _LARGEST, _LEAST = 1e300, 1e-99  # bounds of linear and logarithmic axes: Matplotlib needs room beyond the ends
 _MOST_ROWS = 40  # a longer table scrolls
 _NARROW = 4  # largest number of columns that fit on a narrow page
+_HEAD = (
+    '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
+    '<meta name="viewport" content="width=device-width">'
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+    "<title>{title}</title><style>body{{margin:1.5em auto;max-width:72em;padding:0 1em}}"
+    "h2{{font:600 1em system-ui,sans-serif;margin:1.6em 0 .4em}}</style></head><body>\n{body}\n</body></html>\n"
+)
 # more specific than the styles of notebooks, which align all cells to the right
 _STYLE = (
     "<style>.robot-dyn{font:13px/1.45 system-ui,sans-serif;max-width:70em}"
@@ -53,6 +60,11 @@ _STYLE = (
 def page(title: str, *parts: str) -> str:
     """Return a block of HTML with a title; the parts are HTML."""
     return f'<div class="robot-dyn">{_STYLE}<div class="t">{escape(title)}</div>{"".join(parts)}</div>'
+
+
+def document(title: str, body: str) -> str:
+    """Return an HTML document without scripts, with a body in HTML."""
+    return _HEAD.format(title=escape(title), body=body)
 
 
 def text(lines: str | Iterable[str]) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from robot_dyn.foundations import files
 from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations.display import document
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.result import json_text, reported
 from robot_dyn.foundations.validate import choice
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 JSON = files.FileKind("a result", ".json", b'{\n "robot":')
+REPORT = files.FileKind("a report", ".html", b"<!doctype html>")
 INTERRUPTED = "the remaining parts, because of an interruption"
 
 
@@ -70,7 +72,8 @@ class Result(Answer):
         """Save the result in the format of the suffix of `path`; without a suffix, in the first format it supports.
 
         PNG, SVG and PDF contain the figure and CSV the table of a certificate, of costs, of work and precision, of two
-        runs or of a budget; JSON contains any result. An existing file is replaced only if it has the same format.
+        runs or of a budget; HTML and JSON contain any result. An existing file is replaced only if it has the same
+        format.
 
         Args:
             path: Path of the file.
@@ -87,6 +90,8 @@ class Result(Answer):
             stream.write(self._csv().encode())
         elif path.suffix.lower() == JSON.suffix:
             stream.write(json_text(self).encode())
+        elif path.suffix.lower() == REPORT.suffix:
+            stream.write(document(self.sentence, self._repr_html_()).encode())
         else:
             self._drawn(theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
         return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
@@ -116,7 +121,7 @@ class Result(Answer):
 def kinds(result_type: type[Result]) -> tuple[files.FileKind, ...]:
     """Return the kinds of file in which results of a class can be written."""
     tables = (table_kind(result_type),) if result_type.columns else ()
-    return (*(PICTURES if result_type.diagram else ()), *tables, JSON)
+    return (*(PICTURES if result_type.diagram else ()), *tables, REPORT, JSON)
 
 
 def table_kind(result_type: type[Result]) -> files.FileKind:

@@ -85,7 +85,7 @@ def test_files_of_another_kind_are_not_replaced(tmp_path, name: str, content: st
 
 def test_each_drawing_is_of_a_result_with_a_table() -> None:
     for each in (each for each in Result.__subclasses__() if each.diagram):
-        assert [kind.suffix for kind in kinds(each)] == [".png", ".svg", ".pdf", ".csv", ".json"]
+        assert [kind.suffix for kind in kinds(each)] == [".png", ".svg", ".pdf", ".csv", ".html", ".json"]
 
 
 def test_advice_has_the_keys_that_are_promised() -> None:

@@ -1,4 +1,4 @@
-"""Remarks on observations at every step: chatter, levels, coarse records, energy gains and creep."""
+"""Remarks on observations at every step: chatter, levels, torque–speed lines, coarse records, energy gains, creep."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from robot_dyn.control.digital_loop.block import Noise, Quantisation
 from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.effects.friction import RegularisedCoulombFriction
+from robot_dyn.effects.torque_speed_limit import TorqueSpeedLimit
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.queries.dynamics import Dynamics
@@ -65,7 +66,8 @@ def remarks(
         against(setup, t, samples[:, :n]),
     )
     return (
-        *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
+        *of_steps(*of_run), *_on_lines(setup, t, v, samples[:, 2 * n :], units),
+        *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
         *_creeping(setup, t, v, units), *of_reference(setup, t, observed.extremes[0], units),
     )  # fmt: skip
 
@@ -108,6 +110,24 @@ def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Itera
             continue
         at = int(np.nanargmax(P))
         yield Remark(RemarkKind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0)
+
+
+def _on_lines(setup: Setup, t: np.ndarray, v: np.ndarray, u: np.ndarray, units: Units) -> Iterator[Remark]:
+    """Yield motors that are at their torque–speed line at samples, with v and u (m, n)."""
+    half = np.diff(t, prepend=t[:1], append=t[-1:]) / 2
+    weights = half[:-1] + half[1:]
+    for effect in setup.plant.effects:
+        if not isinstance(effect, TorqueSpeedLimit):
+            continue
+        at_line = (np.abs(effect.limited(u, v)) >= 1 - _ROUNDING) & effect.limits_joint
+        for i in np.flatnonzero(at_line.any(axis=0)):
+            rows = np.flatnonzero(at_line[:, i])
+            k = rows[np.abs(v[rows, i]).argmax()]
+            _, of_v, of_u = units[i]
+            facts: dict[str, float | str] = {"unit": of_u, "unit_of_v": of_v, "speed": float(abs(v[k, i]))}
+            times = float(t[rows[0]]), float(weights[rows].sum()), float(t[k])
+            name = setup.plant.dynamics.joint_names[i]
+            yield Remark(RemarkKind.LINE_REACHED, name, "u", *times, float(u[k, i]), None, facts=facts)
 
 
 def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Iterator[Remark]:

@@ -24,6 +24,8 @@ class RemarkKind(StrEnum):
     """The actuation reverses at ten or more ticks in a row; `value` is half of the change between two ticks."""
     EFFORT_REACHED = "effort_limit_reached"
     """An effort limit of the plant or of the controller cuts the actuation."""
+    LINE_REACHED = "torque_speed_line_reached"
+    """At samples, a motor is at its torque–speed line; `value` is its actuation at the largest speed there."""
     STOP_REACHED = "joint_stop_reached"
     """The joint touches a stop of the plant."""
     BEYOND = "beyond_limit_of_file"
@@ -94,6 +96,11 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     ),
     RemarkKind.EFFORT_REACHED: Sentence(
         "effort limit reached", ("{joint} " + _LASTED + " ({bound:.4g} {unit})", _SEEN)
+    ),
+    RemarkKind.LINE_REACHED: Sentence(
+        "torque–speed line reached",
+        ("{joint} " + _LASTED + " ({value:.4g} {unit} at {speed:.4g} {unit_of_v})",),
+        ("move slower, or use a motor with more torque at this speed",),
     ),
     RemarkKind.STOP_REACHED: Sentence(
         "joint stop reached", ("{joint} {value:.4g} {unit} (stop at {limit:.4g}) at {at:.4g} s, " + _LASTED,)

@@ -17,6 +17,7 @@ from robot_dyn.foundations import (
     FileKind,
     Table,
     Value,
+    document,
     json_text,
     read_only,
     reported,
@@ -174,6 +175,5 @@ class Identification(Answer, Value):
         elif path.suffix.lower() == _JSON.suffix:
             text = json_text(self).encode()
         else:
-            head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{self.arm}</title>'
-            text = f"{head}{self._repr_html_()}</html>\n".encode()
+            text = document(self.arm, self._repr_html_()).encode()
         return save_file(path, lambda stream: stream.write(text), ResultError)

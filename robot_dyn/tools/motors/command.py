@@ -97,7 +97,8 @@ def budget(
             result = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
     more = _more(result, max_payload, fastest, 1.0 if fraction is None else fraction)
     budgets = [result, more["fastest"].budget] if fastest else [result]
-    results.give(result, paths, budgets[-1], **more)
+    first = more["fastest"].cycle_times if fastest else ""
+    results.give(result, paths, budgets[-1], first, **more)
     if not all(x.fits for x in budgets):
         raise typer.Exit(1)
 

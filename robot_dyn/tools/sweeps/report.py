@@ -8,24 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.foundations import Block, html_of, inline, page
+from robot_dyn.foundations import Block, document, html_of, inline, page
 from robot_dyn.report import PAGE, ink, styled
 from robot_dyn.tools.sweeps.sensitivity import bins
 
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
-_HEAD = (
-    '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
-    '<meta name="viewport" content="width=device-width">'
-    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-    "<title>{title}</title><style>body{{margin:1.5em auto;max-width:72em;padding:0 1em}}"
-    "h2{{font:600 1em system-ui,sans-serif;margin:1.6em 0 .4em}}</style></head><body>\n{body}\n</body></html>\n"
-)
 
 
-def document(title: str, sections: Iterable[tuple[str, str, Iterable[Block]]]) -> str:
+def sections_page(title: str, sections: Iterable[tuple[str, str, Iterable[Block]]]) -> str:
     """Return the page of sections; a section has a heading, a drawing, and texts and tables."""
     parts = (f"<h2>{escape(heading)}</h2>{drawing}{''.join(html_of(blocks))}" for heading, drawing, blocks in sections)
-    return _HEAD.format(title=escape(title), body=page(title, *parts))
+    return document(title, page(title, *parts))
 
 
 def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:

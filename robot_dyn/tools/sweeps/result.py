@@ -229,10 +229,10 @@ class SweepResult(Answer):
 
     def _report(self) -> bytes:
         """Return the report as an HTML page."""
-        from robot_dyn.tools.sweeps.report import document
+        from robot_dyn.tools.sweeps.report import sections_page
 
         sections = self._failures(), *map(self._of_figure, self.sweep.figures)
-        return document(self.title, (("Runs", "", self.blocks()), *sections)).encode()
+        return sections_page(self.title, (("Runs", "", self.blocks()), *sections)).encode()
 
     @property
     def _repeat(self) -> str:

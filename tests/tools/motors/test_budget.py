@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -307,6 +308,13 @@ def test_what_has_no_budget_is_refused() -> None:
             call()
 
 
+def test_the_page_of_a_budget_has_its_sentence_and_figure_and_no_scripts(tmp_path: Path) -> None:
+    found = budget(PLAN, UR5)
+    text = found.save(tmp_path / "budget.html").read_text(encoding="utf-8")
+    assert text.startswith("<!doctype html>") and found.sentence in text
+    assert "<svg" in text and "<script" not in text
+
+
 @toppra
 def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() -> None:
     """Two strokes with a pause of 0.4 s between; torque at 10 000 times within a thousandth of the limits."""
@@ -469,6 +477,8 @@ def test_the_command_ends_with_1_if_the_fastest_motion_or_the_given_one_is_too_s
     plan, motors = files / "plan.csv", files / "motors.csv"
     done = ran("budget", "ur5", plan, "--fastest", "--fraction", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
     assert done.returncode == 0 and "at 90 % of the peak torques" in done.stdout
+    before, after = (float(x) for x in re.findall(r"[\d.]+", done.stdout.splitlines()[0]))
+    assert after < before == pytest.approx(answer["duration_s"])
     assert "the same path at its limits" in (files / "b.svg").read_text(encoding="utf-8")
     heavy = ran("budget", "ur5", plan, "--limits", motors, "--fastest", "--payload", "wrist_3_link=5kg@0.12,0.03,0.05")
     assert heavy.returncode == 1 and heavy.stdout.rstrip().splitlines()[-1].startswith("too small: ")

@@ -12,6 +12,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
+from robot_dyn.simulation import RemarkKind
 from robot_dyn.tools.motors import TorqueSpeed
 from tests.effects.test_effect_states import MASS, SLIDER
 
@@ -90,9 +91,20 @@ def test_the_budget_of_a_run_at_its_line_uses_all_of_it(tmp_path: Path) -> None:
         duration_s=1.0,
         controller=rd.control.PD(rd.control.hold([99.0]), kp=9.0, kd=0.0),
     )
+    (remark,) = (x for x in run.remarks if x.kind == RemarkKind.LINE_REACHED)
+    assert (remark.joint, remark.start_s, remark.at_s) == ("slide", 0.0, 1.0)
+    assert remark.duration_s == pytest.approx(1.0, rel=1e-12)
+    assert remark.value == pytest.approx(6 * (1 - run.v[-1, 0] / 4), rel=1e-12)
     joint = rd.tools.motors.budget(run, motors=motors).joints[0]
+    assert joint.too_small == ("peak", "line")  # the control demanded more, at rest too
     assert joint.line["used"] == pytest.approx(1.0, abs=1e-9)
     assert joint.speed == pytest.approx(4 * (1 - np.exp(-6 / MASS / 4)), rel=1e-9)
+
+
+def test_a_run_within_its_line_has_no_remark_and_other_joints_no_line() -> None:
+    plant = rd.Plant(ARM, [rd.effects.TorqueSpeedLimit({"joint_1": [0.0, 9.0]}, {"joint_1": [90.0, 0.0]})])
+    run = rd.simulate(plant, [0.1, 0.4], duration_s=0.1)
+    assert all(remark.kind != RemarkKind.LINE_REACHED for remark in run.remarks)
 
 
 def random_motors(arm: rd.Robot, rng: np.random.Generator) -> Any:

@@ -22,6 +22,7 @@ from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.path_plan import PathPlan
 
+_CUT = RemarkKind.EFFORT_REACHED, RemarkKind.LINE_REACHED
 _DRIVES = "series_elastic", "rigid_backlash"  # their motors turn at other speeds than their joints
 
 
@@ -142,9 +143,9 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     motors = _with_rotors(motors, simulated)
     limits = limits_of(Plant(robot), motors, **given)
     demand = of_run(run, limits.gear)
-    cut = frozenset(remark.joint for remark in run.remarks if remark.kind == RemarkKind.EFFORT_REACHED)
+    cut = frozenset(remark.joint for remark in run.remarks if remark.kind in _CUT)
     joints = tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), cut))
-    reported = RemarkKind.EFFORT_REACHED, RemarkKind.COARSE
+    reported = *_CUT, RemarkKind.COARSE
     findings = remark_lines(remark for remark in run.remarks if remark.kind in reported)
     if run.outcome.ending == Ending.STOPPED:
         findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget covers the simulated part")

@@ -66,6 +66,11 @@ class FastestMotion(Answer):
         """Duration of the motion, in [s]."""
         return self.plan.duration_s
 
+    @property
+    def cycle_times(self) -> str:
+        """Durations of the original motion and of this one, in words."""
+        return f"cycle times: {self.before_s:.4g} s as given, {self.duration_s:.4g} s at the limits"
+
     def blocks(self) -> Iterator[Block]:
         _, *rest = self.plan.blocks()
         limit = "" if self.fraction == 1 else f" at {100 * self.fraction:.6g} % of the peak torques"

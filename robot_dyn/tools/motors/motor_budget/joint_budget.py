@@ -47,7 +47,7 @@ class JointBudget:
         line: Largest use of the torque–speed line: "torque" in [N m], "speed" in [rad/s], "limit" at that speed,
             "used", the fraction, and "at_s" in [s]; empty without a line.
         holding: The brake, and the torque of gravity that it holds; None without a brake.
-        cut: True if an effort limit cut the actuation of a run, so that the demand was higher.
+        cut: True if an effort limit or a torque–speed line cut the actuation of a run, so that the demand was higher.
     """
 
     joint: str
@@ -93,9 +93,9 @@ class JointBudget:
     def too_small(self) -> tuple[str, ...]:
         """Limits that are exceeded by more than a thousandth: "peak", "continuous", "speed", "line" or "brake".
 
-        A peak torque at which the actuation was cut is included.
+        A limit at which the actuation was cut is included.
         """
-        most = {"peak": 1 - TOLERANCE} if self.cut else {}
+        most = {"peak": 1 - TOLERANCE, "line": 1 - TOLERANCE} if self.cut else {}
         return tuple(kind for kind, used in self.shares.items() if used > most.get(kind, 1 + TOLERANCE))
 
     def says(self, kind: str) -> str:

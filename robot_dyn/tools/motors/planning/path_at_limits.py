@@ -24,7 +24,7 @@ from robot_dyn.tools.motors.planning.path_plan import (
     phases,
 )
 from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, why_not
-from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, fastest, imposed
+from robot_dyn.tools.motors.planning.time_scaling import IMPOSED, Effects, Speed, cells, fastest, imposed
 
 _CELLS, _MOST_CELLS = 200, 8000  # number of cells of the grid, in addition to breaks of the path
 _ROUNDS = 40
@@ -56,8 +56,9 @@ def path(
 
     τ is the plant's inverse dynamics, with all effects. The motion is a polynomial in each of a few hundred pieces, in
     which s̈ is constant: acceleration and torque jump between pieces, as in all time-optimal motions. The limits are
-    checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass fraction=0.95.
-    With gears of efficiency η, the limit is η τ_max, also for braking; the torque of the motors is checked.
+    checked at 10 000 times and at both ends of each piece. A controller that follows the motion needs torque for
+    feedback: pass fraction=0.95. With gears of efficiency η, the limit is η τ_max, also for braking; the torque of the
+    motors is checked.
 
     Args:
         plant: A plant or an arm.
@@ -94,8 +95,8 @@ def planned(plant: Plant, limits: Limits, points: JointValues | PiecewisePolynom
     check_positions(plant, geometry)
     check_limited(plant, limits.through_gear(), geometry)
     names = plant.dynamics.joint_names
-    motion, use = _within(plant, limits, geometry)
-    largest, at_limits = float(use.largest.max()), float((use.largest >= BINDS).mean())
+    motion, use, largest = _within(plant, limits, geometry)
+    at_limits = float((use.largest >= BINDS).mean())
     moves = np.any(geometry.coefficients[:, 1:], axis=(0, 1))
     free = [name for i, name in enumerate(names) if moves[i] and np.isinf(limits.effort[i])]
     findings = [f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free]
@@ -117,15 +118,20 @@ def planned(plant: Plant, limits: Limits, points: JointValues | PiecewisePolynom
     )
 
 
-def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, LimitUse]:
-    """Return the fastest motion within limits, and its use of the limits."""
+def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, LimitUse, float]:
+    """Return the fastest motion within limits, its use of the limits, and the largest used fraction."""
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
         motion, error = _fastest_motion(plant, limits.through_gear().times(allowed, allowed), path)
         use = limit_use(plant, limits, motion, checked_times(motion.end_s))
-        largest = float(use.largest.max())
+        ends = (motion.breaks[:-1, None] + np.diff(motion.breaks)[:, None] * IMPOSED).ravel()
+        largest = float(max(use.largest.max(), limit_use(plant, limits, motion, ends).largest.max()))
         if largest <= _REFUSED and (error <= _ERROR or limits.line is not None):
-            return motion, use  # where a line is steep, its linearisation is off, but the motion is within limits
+            return (
+                motion,
+                use,
+                largest,
+            )  # where a line is steep, its linearisation is off, but the motion is within limits
         allowed /= max(1.0, largest)
     remedy = "smoother effects" if limits.line is None else "lines of torque over speed without steep parts"
     raise PlanError(
