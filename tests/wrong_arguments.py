@@ -319,7 +319,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.identify.static, arm=robot, poses=rd.tools.identify.Poses(states, robot.N(states)), friction=0.5,
             noise=0.1, tilt=False),
         call(excited.save, path=folder / "excitation.csv"),
-        call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, gains=1.0,
+        call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, repeat=log, gains=1.0,
             effects=[rd.effects.ViscousFriction(0.1)], cutoff_hz=6.0, slow=0.05),
         call(rd.tools.identify.payload, arm=robot, log=log, empty=log, link="pole", reference=excited.reference,
             gains=1.0, cutoff_hz=6.0, slow=0.05),

@@ -8,13 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn import Robot
+from robot_dyn import Plant, Robot
 from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.foundations import instance, number, numbers, several, shown
+from robot_dyn.foundations import instance, number, numbers
 from robot_dyn.report import processor_and_versions
 from robot_dyn.tools.identify.corrected import corrected
-from robot_dyn.tools.identify.estimation import COULOMB, VISCOUS, Estimate, Model, estimate, model_of
+from robot_dyn.tools.identify.estimation import (
+    COULOMB,
+    STRIBECK,
+    VISCOUS,
+    Estimate,
+    Friction,
+    Model,
+    estimate,
+    model_of,
+)
 from robot_dyn.tools.identify.log import Log, LogError, read_log, swapped
 from robot_dyn.tools.identify.physical import Links, links_of, nearest_possible
 from robot_dyn.tools.identify.regression import Rows, fit, rms
@@ -39,25 +48,29 @@ def identify(
     log: object,
     *,
     reference: PiecewisePolynomial | None = None,
+    repeat: object = None,
     gains: ArrayLike | None = None,
-    effects: Iterable[Effect] | None = None,
+    effects: Iterable[Effect] | str | None = None,
     cutoff_hz: float = CUTOFF_HZ,
     slow: ArrayLike | None = None,
 ) -> Identification:
     """Estimate the parameters of an arm, its friction and offsets from a log of its motion.
 
     Torques are linear in base parameters, rotor inertias, viscous and Coulomb friction, offsets and a time offset. They
-    are estimated by weighted instrumental variables from the desired motion, without rows of a joint near rest.
+    are estimated by weighted instrumental variables, without rows of a joint near rest. The instruments are the desired
+    motion, or the positions of a second log.
 
     Args:
         arm: The arm of the file; joints that do not move are locked.
         log: CSV file, data frame, columns by heading, or `Trajectory`: "t", "q JOINT", "tau JOINT" or "current JOINT",
             and "desired JOINT" if known. In a dict, "t", "q", "tau", "current" and "desired" may be arrays (m, n).
-        reference: The desired motion at the times of the log, if the log has no desired positions. Without it,
-            instruments are smoothed positions of the log, and intervals are less reliable.
+        reference: The desired motion at the times of the log, if the log has no desired positions.
+        repeat: A second log of the same motion, the source of instruments if there is no reference. Without both and
+            without desired positions, they are smoothed positions, and intervals are less reliable.
         gains: Drive gains, a number or (n,), in [N m/A], if the log has currents.
         effects: Friction that the arm is supposed to have, `ViscousFriction`, `DryFriction` or
-            `RegularisedCoulombFriction`; then wrong friction can be a cause in the verdict.
+            `RegularisedCoulombFriction`, or "urdf" for that of the file; then wrong friction can be a cause in the
+            verdict. With the Stribeck velocity of `DryFriction`, static friction is estimated too.
         cutoff_hz: Cutoff of the zero-phase filters of regressor and torque, in [Hz].
         slow: Speed below which rows of a joint are left out, a number or (n,), in [rad/s] or [m/s]; by default 5 % of
             the largest speed of the joint.
@@ -72,16 +85,15 @@ def identify(
     2014; Wensing, Kim, Slotine 2018.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=LogError)
-    links, stated = links_of(arm), _friction(arm, effects)
-    record = read_log(arm, log, reference, gains)
-    model, result = estimated(arm, record, cutoff_hz, slow)
+    links, friction = links_of(arm), _friction(arm, effects)
+    record = read_log(arm, log, reference, gains, repeat)
+    model, result = estimated(arm, record, cutoff_hz, slow, {} if friction is None else friction.stribeck)
     held_out = _held_out(model, result)
     _refuse_foreign(arm, result, held_out)
     r = len(model.base.columns)
     theta = nearest_possible(links, model.base.R, result.fit.values[:r], result.fit.covariance[:r, :r])
     parameters = tuple(_parameters(model, result))
-    friction = _identified_friction(model, result)
-    robot, text = _corrected(arm, links, theta, friction, parameters, model, result)
+    robot, text = _corrected(arm, links, theta, _identified_friction(model, result), parameters, model, result)
     determined, blind = _determined(model, result, links, theta)
     confounded = (joint for i, joint in enumerate(arm.joint_names) if i not in model.rotors)
     return Identification(
@@ -93,16 +105,19 @@ def identify(
         time_offset_s=float(result.fit.values[-1]),
         time_offset_half_width_s=float(result.fit.half_widths[-1]),
         held_out=held_out,
-        verdict=verdict_of(model, links, result, stated),
-        has_reference=record.reference is not None,
+        verdict=verdict_of(model, links, result, friction),
+        instruments=record.instruments,
         cutoff_hz=cutoff_hz,
         environment=processor_and_versions(),
         robot=robot,
         urdf=text,
+        file=arm,
     )
 
 
-def estimated(arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None) -> tuple[Model, Estimate]:
+def estimated(
+    arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None, stribeck: dict[int, float] | None = None
+) -> tuple[Model, Estimate]:
     """Return the linear model of an arm and its estimate from a log; for arguments and errors see `identify`."""
     cutoff_hz = number("cutoff_hz", cutoff_hz, above=0, error=LogError)
     if not _PERIODS / np.ptp(log.t) <= cutoff_hz <= 0.5 / log.step_s:
@@ -110,28 +125,29 @@ def estimated(arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None) ->
             f"cutoff_hz must be from {_PERIODS / np.ptp(log.t):.3g} Hz, for {np.ptp(log.t):.4g} s, to"
             f" {0.5 / log.step_s:.4g} Hz, half the rate of the log; got {cutoff_hz:g}"
         )
-    model = model_of(arm)
+    model = model_of(arm, stribeck)
     signals = Signals(float(log.t[0]), log.step_s, len(log.t), cutoff_hz)
     speed = np.abs(np.gradient(signals.first(log.q), log.step_s, axis=0)).max(axis=0)
     least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
     return model, estimate(model, log, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
 
 
-def _friction(arm: Robot, effects: Iterable[Effect] | None) -> np.ndarray | None:
-    """Return viscous and Coulomb friction of effects, (2, n); None without effects."""
+def _friction(arm: Robot, effects: Iterable[Effect] | str | None) -> Friction | None:
+    """Return the friction of effects; None without effects."""
     if effects is None:
         return None
-    result = np.zeros((2, arm.n))
-    if (given := several(effects)) is None:
-        raise LogError(f"effects must be a list of friction, got {shown(effects)}")
-    for effect in given:
+    viscous, coulomb, excess, stribeck = *np.zeros((3, arm.n)), {}
+    for effect in Plant(arm, effects).effects:
         if isinstance(effect, ViscousFriction):
-            result[0] += effect.viscous
+            viscous += effect.viscous
         elif isinstance(effect, DryFriction | RegularisedCoulombFriction):
-            result[1] += effect.coulomb
+            coulomb += effect.coulomb
+            if isinstance(effect, DryFriction) and effect.stribeck_velocity is not None:
+                excess += np.subtract(effect.static, effect.coulomb)
+                stribeck = dict(enumerate(np.broadcast_to(effect.stribeck_velocity, arm.n).tolist()))
         else:
             raise LogError(f"effects: {type(effect).__name__} is not friction; remove it from the log's torques first")
-    return result
+    return Friction(viscous, coulomb, excess, stribeck)
 
 
 def _refuse(arm: Robot) -> Any:
@@ -166,10 +182,10 @@ def _held_out(model: Model, found: Estimate) -> HeldOut:
     """Return rms errors of the last quarter of the log, with numbers from its first three."""
     rows, m = found.rows, len(found.rows.tau)
     training = np.arange(m)[:, None] < _TRAINING * m
-    n, last = model.arm.n, rows.used & ~training
+    last = rows.used & ~training
     own = model.stated
     rest = rows.tau - rows.Y[..., : len(own)] @ own
-    joints = np.arange(len(own), len(own) + 3 * n)
+    joints = np.arange(len(own), len(rows.names) - 1)
     fitted = fit(rows.where(training).only(joints, rest))
     new = fit(rows.where(training))
     return HeldOut(
@@ -236,7 +252,7 @@ def _corrected(
         values = "; ".join(f"{p.name.removeprefix(body).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own)
         notes[link] = f"identified base parameters (95 %): {values or 'none'}; the rest is nearest to the old file"
     for joint in arm.joint_names:
-        own = [p for p in parameters if p.name in (f"{joint} {VISCOUS}", f"{joint} {COULOMB}")]
+        own = [p for p in parameters if p.name in {f"{joint} {kind}" for kind in (VISCOUS, COULOMB, STRIBECK)}]
         notes[joint] = "identified friction (95 %): " + "; ".join(
             f"{p.name.removeprefix(joint).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own
         )
