@@ -132,3 +132,9 @@ def test_the_page_says_what_each_is_for() -> None:
     rows = re.findall(r"^\| ([\w, -]+) \| ", page, flags=re.MULTILINE)
     listed = {normal(name) for row in rows for name in row.split(", ")} - {"package"}
     assert listed == DECLARED | EXTRA
+
+
+def test_the_page_of_the_install_lists_every_extra() -> None:
+    page = (ROOT / "docs" / "start" / "install.md").read_text(encoding="utf-8")
+    extras = set(PROJECT["project"]["optional-dependencies"])
+    assert set(re.findall(r"^\| `(\w+)` \| ", page, flags=re.MULTILINE)) == extras

@@ -142,7 +142,7 @@ class Results:
     def files(self, of: type, *inputs: str | None) -> list[Path]:
         """Return the paths to write a figure and a table of a class of results to, checked before the work is done."""
         from robot_dyn.report.figure import ResultError
-        from robot_dyn.report.save import table_kind
+        from robot_dyn.report.result import table_kind
         from robot_dyn.view.plots.pictures import PICTURES
 
         if self.dark and not self.output:

@@ -20,7 +20,7 @@ from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import ControlError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import duration, number, numbers
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.queries.units import of_joint
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Contact:
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class AlarmThreshold(Answer, Value):
+class AlarmThreshold(Answer, ReadOnly):
     """A threshold of each joint, with the alarms per hour to expect without contact.
 
     An alarm is a block in which a joint exceeds its threshold.
@@ -77,9 +77,6 @@ class AlarmThreshold(Answer, Value):
     low: float
     high: float
 
-    def __post_init__(self) -> None:
-        read_only(self)
-
     @reported
     def alarms_per_hour(self) -> float:
         """Alarms per hour in the log itself: 3600 k/(B block_s)."""
@@ -96,7 +93,7 @@ class AlarmThreshold(Answer, Value):
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class ExternalTorque(Answer, Value):
+class ExternalTorque(Answer, ReadOnly):
     """The external torque on the joints over time, as `external_torque` or a `MomentumObserver` estimates it.
 
     Attributes:
@@ -114,9 +111,6 @@ class ExternalTorque(Answer, Value):
     torque: np.ndarray = field(metadata=UNREPORTED)
     offset: np.ndarray
     bandwidth_rad_s: np.ndarray
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @reported
     def largest(self) -> np.ndarray:

@@ -20,7 +20,7 @@ from robot_dyn.control.reference import Reference
 from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import check_coefficients, declared, with_values
 from robot_dyn.foundations.errors import ControlError, shown
-from robot_dyn.foundations.threshold import Threshold
+from robot_dyn.foundations.threshold import Threshold, smooth
 from robot_dyn.foundations.validate import duration
 from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
@@ -255,6 +255,33 @@ class Stateless(Controller):
 
     def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
         return z
+
+
+class Enclosing(Controller):
+    """A sampled controller around another one, its attribute `controller`."""
+
+    controller: Controller
+    thresholds = smooth  # a sampled controller's torque is constant between ticks
+
+    @property
+    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.controller.term
+
+    @property
+    def parts(self) -> tuple[Nested, ...]:
+        return nested(self, "controller", "")
+
+    @property
+    def task_frame(self) -> str | None:
+        return self.controller.task_frame
+
+    @property
+    def saturation(self) -> Scalar:
+        return self.controller.saturation
+
+    @property
+    def cycle(self) -> int:
+        return self.controller.cycle
 
 
 def check_model(model: object) -> None:

@@ -18,11 +18,10 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn.control.contact import ExternalTorque
-from robot_dyn.control.controller import Controller, Nested, check_model, check_sampled, nested
-from robot_dyn.foundations.arithmetic import Array, Scalar
+from robot_dyn.control.controller import Controller, Enclosing, check_model, check_sampled
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import CoefficientField, coefficient, with_values
 from robot_dyn.foundations.errors import ControlError
-from robot_dyn.foundations.threshold import smooth
 from robot_dyn.foundations.validate import function, instance, numbers, truth
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
@@ -37,7 +36,7 @@ _AT_REST = 0.01  # [rad] or [m]: largest motion of a joint at rest
 
 @final
 @dataclass(frozen=True, eq=False)
-class MomentumObserver(Controller):
+class MomentumObserver(Enclosing):
     """A sampled controller with an observer of the external torque, updated at each tick: ṙ = K (τ_ext − r).
 
     The inner controller computes the torque. It acts from tick to tick, so its integral is exact. In a `Loop`, the
@@ -64,8 +63,6 @@ class MomentumObserver(Controller):
     effects: Torque | None = None
     period_s: float = field(init=False, default=0.0)
 
-    thresholds = smooth  # a sampled controller's torque is constant between ticks
-
     def __post_init__(self) -> None:
         check_sampled("controller", self.controller)
         check_model(self.model)
@@ -81,26 +78,6 @@ class MomentumObserver(Controller):
     @property
     def n(self) -> int:
         return self.model.n
-
-    @property
-    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return self.controller.term
-
-    @property
-    def parts(self) -> tuple[Nested, ...]:
-        return nested(self, "controller", "")
-
-    @property
-    def task_frame(self) -> str | None:
-        return self.controller.task_frame
-
-    @property
-    def saturation(self) -> Scalar:
-        return self.controller.saturation
-
-    @property
-    def cycle(self) -> int:
-        return self.controller.cycle
 
     @property
     def state_size(self) -> int:

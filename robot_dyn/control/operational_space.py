@@ -24,7 +24,7 @@ from robot_dyn.foundations.coefficients import CoefficientField, OptionalCoeffic
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.linear_algebra import eigh
 from robot_dyn.foundations.threshold import smooth
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.queries.dynamics import Dynamics, acceleration
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
@@ -32,7 +32,7 @@ POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class TaskDynamics(Answer, Value):
+class TaskDynamics(Answer, ReadOnly):
     """The terms of Λ ẍ + μ + p = F at one state, or at several along batch axes.
 
     Attributes:
@@ -52,9 +52,6 @@ class TaskDynamics(Answer, Value):
     p: Array
     drift: Array
     smallest: Array
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @property
     def projector(self) -> Array:

@@ -13,7 +13,7 @@ from robot_dyn.control.extremes import extreme_values
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.result import reported
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.queries.units import of_joint
 
 _ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
@@ -22,7 +22,7 @@ _PER = {"velocity": "[/s]", "acceleration": "[/s²]", "jerk": "[/s³]"}
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(Answer, Value):
+class Plan(Answer, ReadOnly):
     """A motion of the joints of an arm; pass `plan.reference` to a controller.
 
     Attributes:
@@ -43,9 +43,6 @@ class Plan(Answer, Value):
     method: str
     limits: Mapping[str, np.ndarray]
     findings: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @reported
     def duration_s(self) -> float:

@@ -23,7 +23,7 @@ from robot_dyn.foundations.errors import PlanError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.foundations.validate import choice, instance, integer, number, numbers, one_state
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes
 from robot_dyn.queries.units import of_joint
@@ -44,7 +44,7 @@ _RANK = 1e-9  # relative to the largest entry of J
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class InverseKinematics(Answer, Value):
+class InverseKinematics(Answer, ReadOnly):
     """The joint positions that bring a frame to a pose, or as near to it as the search came.
 
     Attributes:
@@ -82,9 +82,6 @@ class InverseKinematics(Answer, Value):
     redundancy: int
     moving_joints: int
     conditions: int
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @reported
     def unique(self) -> bool:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from robot_dyn.foundations.validate import JointValues
 
 
-# number of prescribed values at each end of a piece, by kind of spline
-_DERIVATIVES = {"cubic": 2, "quintic": 3}
-_MOST_POINTS = 2000  # the equations of a spline are solved together, in 200 MB
+_DERIVATIVES = {"cubic": 1, "quintic": 2}  # number of prescribed derivatives at each end, by kind of spline
+_MOST_POINTS = 2000  # steps of a run end at each of them; more are samples of a measurement
+_MISSED = 1e-6  # relative to the largest sample: far above rounding, far below the error of a failed spline
 _FACTORIALS = np.array([factorial(j) for j in range(6)], dtype=float)
 # The inverse of [j!/(j − r)!] with r < m ≤ j < 2m: maps the remainder of the low half at s = 1 to the high half.
 _UPPER = {
@@ -218,19 +218,16 @@ def via_points(
     Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
     """
     kind = choice("kind of spline", kind, _DERIVATIVES, error=ControlError)
-    m, rows = _DERIVATIVES[kind], _of_joints("points", points, joint_names, ("k + 1", "n"))
+    rows = _of_joints("points", points, joint_names, ("k + 1", "n"))
     if len(rows) < 2:
         raise ControlError(f"points: at least 2 are needed, got {len(rows)}; to rest at one point, use hold(q)")
     if len(rows) > _MOST_POINTS:
         raise ControlError(f"points: at most {_MOST_POINTS} are allowed, got {len(rows)}; use rd.control.Samples")
     t = increasing("times_s", times_s, len(rows))
-    unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
-    shape = rows.shape[1:]
-    rates = (_of_joints(name, v, joint_names, (), shape) for name, v in (("v0", v0), ("v1", v1)))
-    ends = np.stack([np.broadcast_to(v, shape) for v in rates])
-    data = _smooth_derivatives(np.diff(t) / unit, rows, m, ends * unit)
-    pieces = hermite(np.diff(t) / unit, np.concatenate([data[:-1], data[1:]], axis=1))
-    return PiecewisePolynomial(t, pieces / unit ** np.arange(2.0 * m)[:, None])
+    ends = np.zeros((2, _DERIVATIVES[kind], rows.shape[1]))
+    for end, name, v in zip(ends, ("v0", "v1"), (v0, v1), strict=True):
+        end[0] = _of_joints(name, v, joint_names, (), rows.shape[1:])
+    return PiecewisePolynomial(*spline(t, rows, ends))
 
 
 def _of_joints(what: str, values: object, joint_names: Sequence[str] | None, *shapes: validate.Shape) -> np.ndarray:
@@ -256,30 +253,46 @@ def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return np.concatenate([low, _UPPER[m] @ rest], axis=1) / powers
 
 
-def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndarray) -> np.ndarray:
-    """Compute values and m − 1 derivatives at the knots, (k + 1, m, n), that make derivatives m … 2m − 2 continuous.
+@np.errstate(all="ignore")  # overflow raises an error
+def spline(t: np.ndarray, q: np.ndarray, ends: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return breaks and coefficients of the spline through m samples.
 
-    The end velocities are `ends`, (2, n); the end accelerations are zero.
+    With `ends`, the first k derivatives at both ends, (2, k, n), the degree is 2 k + 1, and 2 samples suffice. Without,
+    the ends are not-a-knot and the degree is 5 or, if m < 6, m − 1.
+
+    Raises:
+        ControlError: If the spline does not pass through the samples in floating point.
     """
-    k, n = len(h), points.shape[-1]
-    basis = hermite(h, np.broadcast_to(np.eye(2 * m), (k, 2 * m, 2 * m)))  # coefficients of each piece from its ends
-    orders = range(m, 2 * m - 1)
-    jumps = np.zeros((k - 1, m - 1, k + 1, m))
-    for row, r in enumerate(orders):
-        slope = np.array([perm(j, r) for j in range(2 * m)]) * h[:, None] ** np.maximum(np.arange(2 * m) - r, 0)
-        before = np.einsum("kj,kje->ke", slope, basis)[:-1].reshape(k - 1, 2, m)
-        after = (_FACTORIALS[r] * basis[1:, r]).reshape(k - 1, 2, m)
-        for i in range(k - 1):
-            jumps[i, row, i : i + 2] += before[i]
-            jumps[i, row, i + 1 : i + 3] -= after[i]
-    data = np.zeros((k + 1, m, n))
-    data[:, 0], data[[0, -1], 1] = points, ends
-    size = (k - 1) * (m - 1)
-    right_side = jumps[..., 0].reshape(size, k + 1) @ points  # accelerations at the ends are zero and add nothing
-    right_side += jumps[:, :, [0, -1], 1].reshape(size, 2) @ ends
-    matrix = jumps[:, :, 1:-1, 1:].reshape(size, size)
-    data[1:-1, 1:] = np.linalg.solve(matrix, -right_side).reshape(k - 1, m - 1, n)
-    return data
+    from scipy.interpolate import make_interp_spline
+
+    unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
+    s, degree, at_ends = (t - t[0]) / unit, min(5, len(t) - 1), None
+    if ends is not None:
+        degree = 2 * ends.shape[1] + 1
+        at_ends = tuple([(r, unit**r * x) for r, x in enumerate(derivatives, 1)] for derivatives in ends)
+    try:
+        curve = make_interp_spline(s, q, k=degree, bc_type=at_ends)
+        inside = np.isin(s, curve.t)  # not-a-knot omits two samples next to each end, for an even degree one
+        inside[[0, -1]] = True
+        starts = s[inside][:-1]
+        terms = [curve.derivative(r)(starts) / factorial(r) if r else curve(starts) for r in range(degree + 1)]
+        coefficients = np.stack(terms, axis=1) / unit ** np.arange(degree + 1)[:, None]
+        missed = float(np.abs(curve(s) - q).max())
+    except (ValueError, np.linalg.LinAlgError):  # steps or samples overflow, or vanish next to others
+        raise _without_spline(t, q, degree) from None
+    if not (np.isfinite(coefficients).all() and missed <= _MISSED * float(np.abs(q).max())):
+        raise _without_spline(t, q, degree)
+    return t[inside], coefficients
+
+
+def _without_spline(t: np.ndarray, q: np.ndarray, degree: int) -> ControlError:
+    """Return the error for samples that no spline passes through in floating point."""
+    steps = np.diff(t)
+    return ControlError(
+        f"no spline of degree {degree} passes through the samples in floating point: times are {steps.min():.3g} to"
+        f" {steps.max():.3g} s apart, and positions up to {np.abs(q).max():.3g}; remove samples that nearly coincide,"
+        " and check the units"
+    )
 
 
 def increasing(name: str, values: ArrayLike, count: int) -> np.ndarray:

@@ -17,7 +17,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description import catalog
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Edits
-from robot_dyn.description.markup import parse
+from robot_dyn.description.markup import parse, vector_text
 from robot_dyn.description.structure import Structure, stands_on, structure_of
 from robot_dyn.foundations.errors import CatalogError, EditError, nearest
 from robot_dyn.foundations.validate import instance
@@ -49,7 +49,7 @@ def attached(
     if prefix + structure.root not in {link.get("name") for link in tool.iterfind("link")}:
         etree.SubElement(tool, "link", name=prefix + structure.root)  # a root that only a joint names
     fixed = etree.SubElement(tool, "joint", name=joint, type="fixed")
-    etree.SubElement(fixed, "origin", xyz=_words(xyz), rpy=_words(rpy))
+    etree.SubElement(fixed, "origin", xyz=vector_text(xyz), rpy=vector_text(rpy))
     etree.SubElement(fixed, "parent", link=frame)
     etree.SubElement(fixed, "child", link=prefix + structure.root)
     robot.extend(list(tool))
@@ -118,7 +118,3 @@ def _address(address: str, gripper: Description, arm: Description) -> str:
     elif "://" not in address and not (Path(address).is_absolute() or PureWindowsPath(address).drive):
         file = here.absolute().parent / address
     return address if file is None else Path(os.path.relpath(file, there.absolute().parent)).as_posix()
-
-
-def _words(values: np.ndarray) -> str:
-    return " ".join(repr(float(value)) for value in values)

@@ -7,6 +7,8 @@ start, an XML version that does not exist, undeclared prefixes, and a default na
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from typing import SupportsFloat
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -133,3 +135,8 @@ def _refuse_document_type(element: etree._Element, source: str) -> None:
             f"{source}: declares a document type (<!DOCTYPE …>), through which a file can grow without bound or read"
             " other files; remove the declaration"
         )
+
+
+def vector_text(values: Iterable[SupportsFloat]) -> str:
+    """Return numbers as the text of an attribute, from which `float` restores each exactly."""
+    return " ".join(repr(float(value)) for value in values)

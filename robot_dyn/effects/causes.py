@@ -19,7 +19,7 @@ from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import EffectError, QueryError, RobotDynError
 from robot_dyn.foundations.validate import rows
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit, without_rounding
 
@@ -33,7 +33,7 @@ _ROUNDING = 1e-12  # relative to the terms; a torque at its bound may exceed it 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Causes(Answer, Value):
+class Causes(Answer, ReadOnly):
     """The torque of n joints at k times by cause; `torques` add up to `tau`.
 
     Attributes:
@@ -49,9 +49,6 @@ class Causes(Answer, Value):
     t: np.ndarray
     tau: np.ndarray
     torques: dict[str, np.ndarray]
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @property
     def unexplained(self) -> np.ndarray:

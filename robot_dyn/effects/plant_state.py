@@ -16,7 +16,7 @@ from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import UNREPORTED
 from robot_dyn.foundations.validate import JointValues, instance, number, one_state
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.model.remarks import degree_lines, gravity_lines, order_lines
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
@@ -25,7 +25,7 @@ from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class PlantState(Answer, Value):
+class PlantState(Answer, ReadOnly):
     """A plant of a robot at one state, M a + C v + N = τ.
 
     Attributes:
@@ -61,9 +61,6 @@ class PlantState(Answer, Value):
     held_joints: tuple[HeldJoint, ...]
     plant: Plant = field(metadata=UNREPORTED)
     of_tau: bool = field(metadata=UNREPORTED)
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @property
     def title(self) -> str:

@@ -97,6 +97,7 @@ from robot_dyn.foundations.validate import one_state as one_state
 from robot_dyn.foundations.validate import shaped as shaped
 from robot_dyn.foundations.validate import truth as truth
 from robot_dyn.foundations.values import OnFirstUse as OnFirstUse
+from robot_dyn.foundations.values import ReadOnly as ReadOnly
 from robot_dyn.foundations.values import Value as Value
 from robot_dyn.foundations.values import read_only as read_only
 from robot_dyn.foundations.values import several as several

@@ -41,6 +41,13 @@ class Value:
                 array.setflags(write=False)
 
 
+class ReadOnly(Value):
+    """A frozen dataclass whose arrays are made read-only on construction."""
+
+    def __post_init__(self) -> None:
+        read_only(self)  # pyright: ignore[reportArgumentType]
+
+
 class ArrayField(Protocol):
     """The type of a field that accepts numbers and is read as an array."""
 
@@ -108,7 +115,7 @@ class LRUByIdentity(Generic[Item]):
             return entry[1] if entry is not None and same else None
 
 
-class Derived(Value):
+class Derived(ReadOnly):
     """A frozen dataclass that may be built from a source: a field is read from the source on first access.
 
     Such a field has no default except a factory: a default of the class would hide the source.

@@ -15,6 +15,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Edits
+from robot_dyn.description.markup import vector_text
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import DescriptionError, shorten
 from robot_dyn.model.pinocchio_model import build
@@ -107,7 +108,7 @@ class _Writer:
             self.refuse(where, f"its axis {axis} is not of length 1; normalise it")
         element = etree.SubElement(out, "joint", name=name, type=kind)
         self.ends(element, model.jointPlacements[i], link[model.parents[i]], link[i])
-        etree.SubElement(element, "axis", xyz=_words(axis))
+        etree.SubElement(element, "axis", xyz=vector_text(axis))
         etree.SubElement(element, "limit", self.limits(i, where, kind == "continuous"))
         v = model.idx_vs[i]
         friction = self.symmetric(where, "dry friction", model.lowerDryFrictionLimit[v], model.upperDryFrictionLimit[v])
@@ -134,7 +135,7 @@ class _Writer:
 
     def ends(self, joint: etree._Element, placement: Any, parent: str, child: str) -> None:
         rpy = pin.rpy.matrixToRpy(placement.rotation)
-        etree.SubElement(joint, "origin", xyz=_words(placement.translation), rpy=_words(rpy))
+        etree.SubElement(joint, "origin", xyz=vector_text(placement.translation), rpy=vector_text(rpy))
         etree.SubElement(joint, "parent", link=parent)
         etree.SubElement(joint, "child", link=child)
 
@@ -142,7 +143,7 @@ class _Writer:
         if body.mass == 0 and not body.inertia.any():
             return
         inertial, moments = etree.SubElement(link, "inertial"), {}
-        etree.SubElement(inertial, "origin", xyz=_words(body.lever))
+        etree.SubElement(inertial, "origin", xyz=vector_text(body.lever))
         etree.SubElement(inertial, "mass", value=repr(float(body.mass)))
         for row, i in enumerate("xyz"):
             moments |= {f"i{i}{j}": repr(float(body.inertia[row, "xyz".index(j)])) for j in "xyz"[row:]}
@@ -158,7 +159,3 @@ def _new(name: str, taken: set[str]) -> str:
     while name in taken:
         name += "_"
     return name
-
-
-def _words(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)

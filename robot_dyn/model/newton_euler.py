@@ -22,7 +22,7 @@ from robot_dyn.description.edits import Edits
 from robot_dyn.foundations.arithmetic import apply, transpose
 from robot_dyn.foundations.errors import OverflowedError
 from robot_dyn.foundations.validate import JointValues, check_batches, choice, instance, rows, shaped
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.model.calls import Scratch
 from robot_dyn.model.pinocchio_model import every_joint
 from robot_dyn.queries.batch import answered
@@ -31,7 +31,7 @@ from robot_dyn.queries.dynamics import Dynamics
 
 @final
 @dataclass(frozen=True, eq=False)
-class JointWrenches(Value):
+class JointWrenches(ReadOnly):
     """Wrenches F = (f, τ) of parent links on child links, in [N] and [N m]; `wrenches[joint]` is that of one joint.
 
     Attributes:
@@ -43,9 +43,6 @@ class JointWrenches(Value):
     joints: tuple[str, ...]
     at_joints: ndarray
     at_base: ndarray
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     def __getitem__(self, joint: str) -> ndarray:
         """Return the wrench through a joint, (..., 6); raise a QueryError if its name is unknown."""

@@ -19,7 +19,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description.couplings import resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import STANDARD_GRAVITY, Edits, Payload
-from robot_dyn.description.markup import parse
+from robot_dyn.description.markup import parse, vector_text
 from robot_dyn.description.structure import stated_mimics
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.arithmetic import FLOAT64
@@ -90,9 +90,9 @@ def _hold(joint: Any, value: float) -> None:
     origin, axis = joint.find("origin"), _numbers(joint.find("axis").get("xyz"))
     axis, R, p = axis / np.linalg.norm(axis), rotation_rpy(_numbers(origin.get("rpy"))), _numbers(origin.get("xyz"))
     if joint.get("type") == "prismatic":
-        origin.set("xyz", _words(p + R @ axis * value))
+        origin.set("xyz", vector_text(p + R @ axis * value))
     else:
-        origin.set("rpy", _words(rpy_of(R @ rotation(axis, np.float64(value)))))
+        origin.set("rpy", vector_text(rpy_of(R @ rotation(axis, np.float64(value)))))
     joint.set("type", "fixed")
     for tag in ("axis", "limit", "dynamics", "mimic"):
         if (element := joint.find(tag)) is not None:
@@ -103,7 +103,7 @@ def _restate(joint: Any) -> None:
     """Normalise the axis of a joint, as some programs require, and remove limits that its file does not state."""
     limit, axis = joint.find("limit"), joint.find("axis")
     if axis is not None and abs((length := np.linalg.norm(_numbers(axis.get("xyz")))) - 1) > _UNIT_SLACK:
-        axis.set("xyz", _words(_numbers(axis.get("xyz")) / length))
+        axis.set("xyz", vector_text(_numbers(axis.get("xyz")) / length))
     if limit is None or joint.get("type") != "continuous":
         return
     for key in ("lower", "upper"):
@@ -134,7 +134,7 @@ def _add_payload(out: Any, payload: Payload) -> None:
     taken = {element.get("name") for element in out.iter("link", "joint")}
     name = next(free for k in range(len(taken) + 1) if (free := f"payload_{k}") not in taken)
     inertial = etree.SubElement(etree.SubElement(out, "link", name=name), "inertial")
-    etree.SubElement(inertial, "origin", xyz=_words(payload.com), rpy="0 0 0")
+    etree.SubElement(inertial, "origin", xyz=vector_text(payload.com), rpy="0 0 0")
     etree.SubElement(inertial, "mass", value=repr(payload.mass))
     moments = {f"i{a}{b}": (i, j) for i, a in enumerate("xyz") for j, b in enumerate("xyz") if j >= i}
     etree.SubElement(inertial, "inertia", {key: repr(float(payload.inertia[i][j])) for key, (i, j) in moments.items()})
@@ -146,7 +146,3 @@ def _add_payload(out: Any, payload: Payload) -> None:
 
 def _numbers(text: str) -> np.ndarray:
     return np.array(text.split(), dtype=float)
-
-
-def _words(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)

@@ -1,8 +1,7 @@
-"""The base of measured results, their figure, the writer of their files, versions and times.
+"""The base of measured results with its files, their figure, versions and times.
 
-result            base class of results: a sentence, tables, omitted parts
+result            base class of results: a sentence, tables, omitted parts; saved as figure, CSV or JSON
 figure            the layout of their figures
-save              saves a result: figure, CSV or JSON by the suffix
 environment       versions and processor
 timing            times of alternating calls; time_budget: the time that a measurement may take
 """

@@ -9,7 +9,7 @@ from robot_dyn.report.figure import legend as legend
 from robot_dyn.report.figure import sheet as sheet
 from robot_dyn.report.figure import styled as styled
 from robot_dyn.report.result import INTERRUPTED as INTERRUPTED
+from robot_dyn.report.result import JSON as JSON
 from robot_dyn.report.result import Result as Result
-from robot_dyn.report.save import JSON as JSON
 from robot_dyn.report.time_budget import Budget as Budget
 from robot_dyn.report.time_budget import OvertimeError as OvertimeError

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from robot_dyn.foundations import files
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.foundations.result import reported
-from robot_dyn.report.save import drawn, write_result
+from robot_dyn.foundations.result import json_text, reported
+from robot_dyn.foundations.validate import choice
+from robot_dyn.report.figure import ResultError
+from robot_dyn.view.plots.figure import THEMES
+from robot_dyn.view.plots.pictures import PICTURES
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+JSON = files.FileKind("a result", ".json", b'{\n "robot":')
 INTERRUPTED = "the remaining parts, because of an interruption"
 
 
@@ -69,13 +80,45 @@ class Result(Answer):
             QueryError: If `theme` is unknown.
             ResultError: If the suffix is unknown, the file cannot be written, or there is nothing to draw.
         """
-        return write_result(self, path, theme)
+        choice("theme", theme, THEMES)
+        path = files.target(path, kinds(type(self)), ResultError)
+        stream = io.BytesIO()
+        if path.suffix.lower() == ".csv":
+            stream.write(self._csv().encode())
+        elif path.suffix.lower() == JSON.suffix:
+            stream.write(json_text(self).encode())
+        else:
+            self._drawn(theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
+        return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
+
+    def _csv(self) -> str:
+        """Return the rows as CSV."""
+        text = io.StringIO()
+        writer = csv.DictWriter(text, self.columns, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows({key: files.table_cell(x) for key, x in row.items()} for row in self.rows)
+        return text.getvalue()
+
+    def _drawn(self, theme: str) -> Figure:
+        """Draw the result; raise a ResultError if there is nothing to draw."""
+        return import_module(self.diagram).draw(self, theme)
 
     @property
     def drawing(self) -> str:
         from robot_dyn.foundations.display import inline
 
         try:
-            return inline(drawn(self, "page")) if self.diagram else ""
+            return inline(self._drawn("page")) if self.diagram else ""
         except RobotDynError:  # there is nothing to draw
             return ""
+
+
+def kinds(result_type: type[Result]) -> tuple[files.FileKind, ...]:
+    """Return the kinds of file in which results of a class can be written."""
+    tables = (table_kind(result_type),) if result_type.columns else ()
+    return (*(PICTURES if result_type.diagram else ()), *tables, JSON)
+
+
+def table_kind(result_type: type[Result]) -> files.FileKind:
+    """Return the kind of the CSV table of a class of results."""
+    return files.FileKind("a table of results", ".csv", ",".join(result_type.columns[:2]).encode())

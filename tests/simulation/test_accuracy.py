@@ -16,6 +16,7 @@ from robot_dyn.simulation import AccuracyError
 from tests.campaigns.estimates.asked import FAMILIES, answer, asked_scene
 from tests.campaigns.estimates.held import meet
 from tests.campaigns.estimates.truth import truth
+from tests.campaigns.hard.nonsmooth_tutorials import twisting
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -69,6 +70,14 @@ def test_what_is_estimated_below_what_is_asked_is_delivered_with_its_margin() ->
     assert 1 < run.accuracy.margin < 2
     assert f"a margin of {run.accuracy.margin:.1f}" in run.summary
     assert np.abs(run.q - truth(rd.Setup(rd.Plant(ARM), far, duration_s=0.3), run.t)).max() <= 1e-11
+
+
+@pytest.mark.long
+def test_accuracy_is_refused_where_events_accumulate() -> None:
+    """Time stepping takes over where switches accumulate, and has neither a tolerance nor an estimate."""
+    with pytest.raises(AccuracyError) as refusal:
+        rd.simulate(twisting().motion.setup, accuracy=1e-6)
+    assert refusal.value.best == np.inf
 
 
 def test_a_tolerance_is_not_the_error() -> None:

@@ -14,7 +14,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import UNREPORTED, json_text, plain, reported
 from robot_dyn.report import Result, ResultError
-from robot_dyn.report.save import kinds
+from robot_dyn.report.result import kinds
 from tests.promised import check_document
 
 

@@ -35,7 +35,7 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import method
@@ -67,7 +67,7 @@ class HorizonError(RobotDynError):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Reference(Value):
+class Reference(ReadOnly):
     """The reference solution of a motion.
 
     Attributes:
@@ -88,9 +88,6 @@ class Reference(Value):
     horizon_s: float
     parted_s: float | None = None
     lost_s: float | None = None
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @reported
     def records(self) -> int:

@@ -20,12 +20,11 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.control.controller import Controller, Nested, check_joints, check_sampled, nested
+from robot_dyn.control.controller import Controller, Enclosing, Nested, check_joints, check_sampled
 from robot_dyn.control.digital_loop.block import Block
-from robot_dyn.foundations.arithmetic import Array, Scalar
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import ControlError, shown
-from robot_dyn.foundations.threshold import smooth
 from robot_dyn.foundations.validate import integer, number
 
 SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # unit of the signal on each line
@@ -46,7 +45,7 @@ class Instant(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Loop(Controller):
+class Loop(Enclosing):
     """A sampled controller with delays, and blocks between it and the arm.
 
     Delays are in periods T. The controller computes at t_k = k T, from the reference at that time and the measurement
@@ -80,8 +79,6 @@ class Loop(Controller):
     run: int = 0
     period_s: float = field(init=False, default=0.0)
 
-    thresholds = smooth  # a sampled controller's torque is constant between ticks
-
     def __post_init__(self) -> None:
         check_sampled("controller", self.controller)
         object.__setattr__(self, "period_s", self.controller.period_s)
@@ -114,30 +111,14 @@ class Loop(Controller):
         return self.controller.n
 
     @property
-    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return self.controller.term
-
-    @property
     def parts(self) -> tuple[Nested, ...]:
-        parts = [*nested(self, "controller", "")]
+        parts = [*super().parts]
         for line in LINES:
             names = [block.name for block in getattr(self, line)]
             for i, (name, block) in enumerate(zip(names, getattr(self, line), strict=True)):
                 number = f" {names[: i + 1].count(name)}" if names.count(name) > 1 else ""
                 parts.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
         return tuple(parts)
-
-    @property
-    def task_frame(self) -> str | None:
-        return self.controller.task_frame
-
-    @property
-    def saturation(self) -> Scalar:
-        return self.controller.saturation
-
-    @property
-    def cycle(self) -> int:
-        return self.controller.cycle
 
     @property
     def instants(self) -> tuple[float, ...]:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.control.reference import PiecewisePolynomial, spline
 from robot_dyn.control.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
 from robot_dyn.control.samples.publishers import refuse_alternating
 from robot_dyn.control.samples.recorded import recorded
-from robot_dyn.control.samples.spline import Samples, spline
+from robot_dyn.control.samples.spline import Samples
 from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanError
 from robot_dyn.foundations.validate import choice, instance, number
@@ -92,7 +92,9 @@ def from_samples(
     if start_s is not None:
         t = _shifted(t, number("start_s", start_s, error=PlanError))
     at_rest = ends == "rest"
-    reference = PiecewisePolynomial(*spline(t, q, at_rest=True)) if at_rest else Samples(t, q, **table.more)
+    reference = (
+        PiecewisePolynomial(*spline(t, q, np.zeros((2, 2, q.shape[1])))) if at_rest else Samples(t, q, **table.more)
+    )
     method = "; ".join([_method(arm, t, q, ends), *([table.note] if table.note else [])])
     return Plan(
         *(arm.name, arm.joint_names, arm.joint_types, reference, method),

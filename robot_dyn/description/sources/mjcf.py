@@ -25,6 +25,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description.couplings import Mimic, resolve
 from robot_dyn.description.description import content
 from robot_dyn.description.edits import Changes
+from robot_dyn.description.markup import vector_text
 from robot_dyn.description.sources.mjcf_actuators import Actuators
 from robot_dyn.description.sources.mjcf_model import Compiled, compile_model
 from robot_dyn.description.sources.mjcf_shapes import Shapes
@@ -241,7 +242,7 @@ class _Reader:
         kind = ("revolute" if limited else "continuous") if hinge else "prismatic"
         joint = etree.SubElement(out, "joint", name=name, type=kind)
         self.ends(joint, pose, parent, child)
-        etree.SubElement(joint, "axis", xyz=_words(model.jnt_axis[j]))
+        etree.SubElement(joint, "axis", xyz=vector_text(model.jnt_axis[j]))
         limit = etree.SubElement(joint, "limit", effort=self.effort(j), velocity=UNBOUNDED)
         lower, upper = map(float, model.jnt_range[j]) if limited else (-float(UNBOUNDED), float(UNBOUNDED))
         if kind != "continuous":
@@ -267,7 +268,7 @@ class _Reader:
 
     def ends(self, joint: Any, pose: tuple[Any, Any], parent: str, child: str) -> None:
         R, p = pose
-        etree.SubElement(joint, "origin", xyz=_words(p), rpy=_words(rpy_of(R)))
+        etree.SubElement(joint, "origin", xyz=vector_text(p), rpy=vector_text(rpy_of(R)))
         etree.SubElement(joint, "parent", link=parent)
         etree.SubElement(joint, "child", link=child)
 
@@ -276,11 +277,7 @@ class _Reader:
         with np.errstate(all="ignore"):  # the URDF reader refuses infinite values
             inertia = R * model.body_inertia[body] @ R.T
         element = etree.SubElement(link, "inertial")
-        etree.SubElement(element, "origin", xyz=_words(model.body_ipos[body]), rpy="0 0 0")
+        etree.SubElement(element, "origin", xyz=vector_text(model.body_ipos[body]), rpy="0 0 0")
         etree.SubElement(element, "mass", value=repr(float(model.body_mass[body])))
         keys = {f"i{a}{b}": (i, k) for i, a in enumerate("xyz") for k, b in enumerate("xyz") if k >= i}
         etree.SubElement(element, "inertia", {key: repr(float(inertia[at])) for key, at in keys.items()})
-
-
-def _words(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)

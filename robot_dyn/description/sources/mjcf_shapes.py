@@ -12,11 +12,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.description.markup import vector_text
 from robot_dyn.description.sources.mjcf_model import Compiled
 from robot_dyn.foundations.spatial import rpy_of
 
@@ -39,9 +39,9 @@ class Shapes:
         for geom in [geom for geom in visible if not self.touches(geom)] or visible:
             for tag, attributes, R, p in self.placed(geom):
                 visual = etree.SubElement(link, "visual")
-                etree.SubElement(visual, "origin", xyz=_words(p), rpy=_words(rpy_of(R)))
+                etree.SubElement(visual, "origin", xyz=vector_text(p), rpy=vector_text(rpy_of(R)))
                 etree.SubElement(etree.SubElement(visual, "geometry"), tag, attributes)
-                rgba = _words(self.color(geom))  # also its name: urdfdom refuses a material without one
+                rgba = vector_text(self.color(geom))  # also its name: urdfdom refuses a material without one
                 etree.SubElement(etree.SubElement(visual, "material", name=rgba), "color", rgba=rgba)
 
     def kind(self, geom: int) -> str:
@@ -67,7 +67,7 @@ class Shapes:
         R, p, kind = self.compiled.rotation(self.model.geom_quat[geom]), self.model.geom_pos[geom], self.kind(geom)
         x, y, z = map(float, self.model.geom_size[geom])
         if kind == "box":
-            yield "box", {"size": _words((2 * x, 2 * y, 2 * z))}, R, p
+            yield "box", {"size": vector_text((2 * x, 2 * y, 2 * z))}, R, p
         elif kind in ("cylinder", "capsule"):
             yield "cylinder", {"radius": repr(x), "length": repr(2 * y)}, R, p
             for end in (-y, y) if kind == "capsule" else ():
@@ -96,9 +96,5 @@ class Shapes:
         R = R @ R_ref.T
         file = bytes(model.paths[start:]).partition(b"\0")[0].decode(errors="replace")
         address = os.path.relpath(file, self.compiled.path.parent)
-        attributes = {"filename": Path(address).as_posix(), "scale": _words(scale), "materials": "ignored"}
+        attributes = {"filename": Path(address).as_posix(), "scale": vector_text(scale), "materials": "ignored"}
         yield "mesh", attributes, R, p - R @ (scale * p_ref)
-
-
-def _words(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)

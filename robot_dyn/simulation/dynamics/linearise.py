@@ -20,7 +20,7 @@ from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.validate import JointValues, numbers, one_state
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import without_rounding
 from robot_dyn.simulation.dynamics.smooth_differences import ROUNDING, Column
@@ -34,7 +34,7 @@ _NEAR = 1e-6  # relative distance of a threshold that is named as the cause of a
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Linearisation(Answer, Value):
+class Linearisation(Answer, ReadOnly):
     """A and B about one state; unpacks as a pair: `A, B = rd.linearise(…)`.
 
     Attributes:
@@ -58,9 +58,6 @@ class Linearisation(Answer, Value):
     z: np.ndarray
     u: np.ndarray
     t: float | None
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     def __iter__(self) -> Iterator[np.ndarray]:
         return iter((self.A, self.B))

@@ -86,7 +86,7 @@ def trials(setup: Setup, requested: float) -> Generator[Setup, Trajectory, Traje
             k > 0 or rtol == _LOOSEST or not _decides(setup, trial) or _predicted(trial, requested) > least_cost
         ):
             return _achieved(tried[-1], requested, spent)
-        if rtol == least:
+        if rtol == least or method not in _ORDER:  # time stepping, after events that accumulate, has no tolerance
             break
         factor = _AIM * requested / error if isfinite(error) else 1e-2
         rtol = max(least, min(_LOOSEST, rtol * (min(factor, _LAST) if k == _TRIES - 2 else factor)))

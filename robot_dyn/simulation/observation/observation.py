@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.store import Layout
-from robot_dyn.foundations.values import Value, aligned, read_only
+from robot_dyn.foundations.values import ReadOnly, aligned
 from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.observation.chatter import Chatter, Episode, chatters_of, close_all, tick
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
@@ -164,7 +164,7 @@ class Visit:
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Observed(Value):
+class Observed(ReadOnly):
     """The observations of B runs of n joints from start to end.
 
     Attributes:
@@ -182,9 +182,6 @@ class Observed(Value):
     limits: Annotated[np.ndarray, Layout(("B", "L"))]
     visits: Annotated[np.ndarray, Layout(("B", "L", 4))]
     episodes: Annotated[np.ndarray, Layout(("B", "n", 3))]
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     def __repr__(self) -> str:
         return f"<Observed: {len(self.extremes)} runs, {len(self.levels)} levels>"

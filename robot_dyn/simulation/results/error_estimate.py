@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.foundations.store import Layout
 from robot_dyn.foundations.validate import times
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.simulation.results.doubts import Doubt
 
 _SAME = 8 * np.finfo(float).eps  # relative difference of one time computed in two ways
@@ -28,7 +28,7 @@ class Verdict(StrEnum):
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class ErrorEstimate(Value):
+class ErrorEstimate(ReadOnly):
     """Estimated error of positions, the largest over the joints, in [rad] or [m].
 
     Attributes:
@@ -46,9 +46,6 @@ class ErrorEstimate(Value):
     ends_early: Doubt | None = None
     verdict: Verdict = Verdict.ORDER
     no_order: Doubt | None = None
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     def __str__(self) -> str:
         if not self.until_s > 0:

@@ -12,7 +12,7 @@ from typing import Annotated, final
 import numpy as np
 
 from robot_dyn.foundations.store import Layout
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.simulation.results.doubts import Doubt
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
@@ -25,7 +25,7 @@ _CONTRADICTS = 100.0
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Ledger(Value):
+class Ledger(ReadOnly):
     """Energy at the samples of a run, in [J]; arrays of shape (m,).
 
     Attributes:
@@ -43,9 +43,6 @@ class Ledger(Value):
     kinetic_peak: float = 0.0
     stored: dict[str, Annotated[np.ndarray, Layout(("m",))]] = field(default_factory=dict)
     cause: Doubt | None = None
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     def __repr__(self) -> str:
         if not self.is_recorded:

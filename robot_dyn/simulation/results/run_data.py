@@ -14,7 +14,7 @@ from typing import Annotated, Any, final
 import numpy as np
 
 from robot_dyn.foundations.store import Layout
-from robot_dyn.foundations.values import Derived, read_only
+from robot_dyn.foundations.values import Derived
 from robot_dyn.simulation.columns import Column, Variable, by_heading, data_frame, data_set
 from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
@@ -102,9 +102,6 @@ class RunData(Derived):
     u: np.ndarray | None
     statistics: Statistics
     metadata: dict[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
     @property
     def summary(self) -> str:

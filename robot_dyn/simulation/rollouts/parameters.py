@@ -15,7 +15,7 @@ from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_unit, joint_types_of
 from robot_dyn.simulation.setup.setup import Setup
@@ -23,7 +23,7 @@ from robot_dyn.simulation.setup.setup import Setup
 
 @final
 @dataclass(frozen=True, eq=False)
-class SetupParameter(Value):
+class SetupParameter(ReadOnly):
     """A parameter that may differ from run to run.
 
     Attributes:
@@ -37,9 +37,6 @@ class SetupParameter(Value):
     value: np.ndarray
     unit: str
     shape: str
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
 
 @final

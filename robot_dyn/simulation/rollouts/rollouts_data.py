@@ -14,7 +14,7 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.store import NOT_STORED, Layout
 from robot_dyn.foundations.validate import integer
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.foundations.values import ReadOnly
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
@@ -27,7 +27,7 @@ from robot_dyn.simulation.setup.setup import Setup
 
 @final
 @dataclass(frozen=True, eq=False)
-class Overview(Value):
+class Overview(ReadOnly):
     """The overview of a batch.
 
     Attributes:
@@ -37,9 +37,6 @@ class Overview(Value):
     worst: int
     remarks: tuple[Remark, ...]
     rms_tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -70,7 +70,9 @@ class EventSteps:
         self.past_horizon = inf  # time of the first terminal event that a companion passed, in [s]
         self._next_look = FIRST_LOOK if may_replace else 0  # number of steps at which stiffness is checked; 0 for never
         self.stepper, self.control = _stepper(setup, state.equation, mesh)
-        config = cached(setup, event_config if samples else companion_config)
+        config = cached(setup, event_config)
+        if not samples:
+            config = config._replace(sample_period=inf, samples_nodes=False, samples_steps=False)
         shared = 0 if config.share_period == inf else _COMPARED + len(state.table.counts) + 2
         state.allocate(config, int(most_samples(setup)) + 2 if samples else 0, shared, _CHUNK)
         self.handler = EventHandler(state, self.control, len(self.stepper.work.F), thresholds, may_replace)
@@ -227,21 +229,16 @@ def _stepper(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> 
     return stepper, initial_control(stepper.error_order, part * method.rtol, part * method.atol, longest, ends)
 
 
-def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
+def event_config(setup: Setup) -> LoopConfig:
     """Return the settings of the loop, with the periods of samples and of states shared with companions."""
     controls_error, at_nodes = setup.method.controls_error, not setup.record_every_s
     period = setup.record_every_s or (setup.duration_s / _SAMPLES if controls_error else inf)
     share_period = setup.duration_s / _COMPARED if controls_error and setup.estimate_error else inf
     return loop_config(setup.equation, alone=True)._replace(
-        sample_period=float(period) if samples else inf,
+        sample_period=float(period),
         share_period=float(share_period),
-        samples_nodes=samples and at_nodes,
-        samples_steps=samples and at_nodes and not controls_error,
+        samples_nodes=at_nodes,
+        samples_steps=at_nodes and not controls_error,
         duration=float(setup.duration_s),
         restarts=setup.method.needs_jacobian,
     )
-
-
-def companion_config(setup: Setup) -> LoopConfig:
-    """Return the settings of the loop without samples."""
-    return event_config(setup, samples=False)

@@ -51,7 +51,6 @@ CACHED = {
     "table_of": "the segments as arrays",
     "single_run_config": "the settings of a loop of fixed steps",
     "event_config": "the settings of a loop with events",
-    "companion_config": "the settings of the companion runs",
     "start_energies": "kinetic and potential energy at the start",
     "switching_of": "the switching functions",
     "start_table_of": "the values of the switching functions at the start",

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import hypot
 from pathlib import Path
 from typing import Any, final
@@ -106,14 +107,22 @@ def _shape(pieces: tuple[Piece, ...]) -> Shape:
 
 
 def _of_piece(piece: Piece) -> MassProperties | None:
-    """Return the mass properties of a piece at 1 kg/m³: of the solid if closed without overlaps, else of the hull."""
-    vertices, faces = piece.mesh.vertices.astype(float), piece.mesh.faces.astype(int)
+    body = _of_mesh(piece.mesh.vertices.astype(float).tobytes(), piece.mesh.faces.astype(int).tobytes())
+    return None if body is None else body.moved(piece.pose[:3, :3], piece.pose[:3, 3])
+
+
+@lru_cache(maxsize=32)
+def _of_mesh(vertices: bytes, faces: bytes) -> MassProperties | None:
+    """Return mass properties at 1 kg/m³: of the solid if closed without overlaps, else of the hull.
+
+    Links share meshes, and repairs of the text leave them as they are: each is examined once.
+    """
+    points, corners = np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(faces, dtype=int).reshape(-1, 3)
     try:
-        closed = surface.solid(vertices, faces)
+        closed = surface.solid(points, corners)
     except MeshError:
         closed = None
-    body = surface.hull(vertices) if closed is None else closed.body
-    return None if body is None else body.moved(piece.pose[:3, :3], piece.pose[:3, 3])
+    return surface.hull(points) if closed is None else closed.body
 
 
 def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:

@@ -11,30 +11,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from robot_dyn import Payload, Robot
 from robot_dyn.description import parameters as parameters_of
-from robot_dyn.description import unit_inertias
 from robot_dyn.foundations import (
     UNREPORTED,
     Answer,
     Block,
     Table,
     Value,
-    adjoint_inverse,
     choice,
     instance,
-    needs,
     read_only,
     spatial_inertia,
 )
 from robot_dyn.tools.identify.estimation import Estimate, Model
 from robot_dyn.tools.identify.identification import CUTOFF_HZ, estimated
 from robot_dyn.tools.identify.log import LogError, read_log
-from robot_dyn.tools.identify.physical import pseudo_inertia
+from robot_dyn.tools.identify.physical import MARGIN, centred, nearest_bodies, pseudo_inertia, seen_from
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -45,7 +42,6 @@ NAMES = "m", "m cx", "m cy", "m cz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"
 _SIZE_M = 0.1  # [m]: unit of the centre of mass and of moments, so that columns are of similar size
 _BLIND = 1e-7  # least singular value of what the log shows, relative to the largest
 _PULL = 1e-3  # weight of zero, in standard errors by size, where the log shows nothing
-_MARGIN = 1e-9  # least eigenvalue of P, in units of the size: rounding of the solver
 
 
 @final
@@ -88,7 +84,8 @@ class PayloadEstimate(Answer, Value):
         yield f"{self.arm}: load at {self.link}, {self.load.mass:.4g} kg at {np.round(self.load.com, 4).tolist()} m"
         if not self.has_empty:
             yield "relative to the arm's numbers, whose errors are not in the intervals; give a log without load"
-        consistent = parameters_of(spatial(self.load))
+        load = self.load
+        consistent = parameters_of(spatial_inertia(load.mass, np.array(load.com), np.array(load.inertia)))
         heading = "parameter", "estimate", "± 95 %", "nearest body"
         yield Table(heading, tuple(zip(NAMES, self.values, self.half_widths, consistent, strict=True)), digits=4)
         if self.blind:
@@ -150,16 +147,13 @@ def payload(
     values = V[seen].T @ (U[:, seen].T @ z / s[seen])
     errors = np.linalg.norm(V[seen].T / s[seen], axis=1)
     is_blind = np.linalg.norm(np.eye(10) - V[seen].T @ V[seen], axis=0) > np.sqrt(_BLIND)
-    is_possible = not is_blind.any() and float(np.linalg.eigvalsh(pseudo_inertia(values))[0]) > _MARGIN
-    body = values if is_possible else _nearest_body(W, z)
+    is_possible = not is_blind.any() and float(np.linalg.eigvalsh(pseudo_inertia(values))[0]) > MARGIN
+    pulled = np.vstack([W, _PULL * np.eye(10)]), np.append(z, np.zeros(10))
+    m, c, inertia = centred(sizes * (values if is_possible else nearest_bodies(*pulled)))
+    body = Payload(link, m, tuple(c.tolist()), tuple(map(tuple, ((inertia + inertia.T) / 2).tolist())))
     return PayloadEstimate(
-        *(
-            arm.name,
-            link,
-            np.where(is_blind, np.nan, values * sizes),
-            np.where(is_blind, np.inf, 1.96 * errors * sizes),
-        ),
-        *(empty is not None, is_possible, _load(link, body * sizes)),
+        *(arm.name, link, np.where(is_blind, np.nan, values * sizes)),
+        *(np.where(is_blind, np.inf, 1.96 * errors * sizes), empty is not None, is_possible, body),
     )
 
 
@@ -175,37 +169,7 @@ def _in_bodies(arm: Robot, link: str) -> np.ndarray:
         g = np.linalg.inv(arm.placement(q, bodies[k])) @ arm.placement(q, link)
         moved = np.linalg.inv(arm.placement(q + 0.5, bodies[k])) @ arm.placement(q + 0.5, link)
         if np.allclose(g, moved, atol=1e-9):
-            X = adjoint_inverse(g[:3, :3], g[:3, 3])
             result = np.zeros((len(bodies), 10, 10))
-            result[k] = np.stack([parameters_of(X.T @ unit @ X) for unit in unit_inertias(np.dtype(float))], axis=1)
+            result[k] = seen_from(arm, q, bodies[k], link)
             return result.reshape(-1, 10)
     raise LogError(f"link {link!r} is not moved by a joint; name the link that carries the load")
-
-
-def _nearest_body(W: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the parameters of a possible body, in units of the sizes, that fit W θ = z best."""
-    cp: Any = needs("cvxpy", extra="identify")
-    needs("clarabel", extra="identify")
-    x = cp.Variable(10)
-    objective = cp.sum_squares(W @ x - z) + _PULL**2 * cp.sum_squares(x)
-    units = np.stack([pseudo_inertia(unit).ravel() for unit in np.eye(10)], axis=1)  # P is linear
-    P = cp.reshape(units @ x, (4, 4), order="C")
-    problem = cp.Problem(cp.Minimize(objective), [P >> _MARGIN * np.eye(4)])
-    problem.solve(solver=cp.CLARABEL)
-    if x.value is None:
-        raise LogError(f"no possible body fits the log ({problem.status}); check the units of the torques")
-    return np.asarray(x.value)
-
-
-def _load(link: str, theta: np.ndarray) -> Payload:
-    """Return the load with these parameters about the origin of the link."""
-    m, c = float(theta[0]), theta[1:4] / theta[0]
-    Ixx, Ixy, Iyy, Ixz, Iyz, Izz = theta[4:]
-    about = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
-    inertia = about - m * (c @ c * np.eye(3) - np.outer(c, c))
-    return Payload(link, m, tuple(c.tolist()), tuple(map(tuple, ((inertia + inertia.T) / 2).tolist())))
-
-
-def spatial(load: Payload) -> np.ndarray:
-    """Return the spatial inertia of a load in the frame of its link, (6, 6)."""
-    return spatial_inertia(load.mass, np.array(load.com), np.array(load.inertia))

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_dyn import Robot
 from robot_dyn.tools.doctor import Document
-from robot_dyn.tools.identify.physical import Links, inertial_texts
+from robot_dyn.tools.identify.physical import Links, centred
 
 _CHANGED = 1e-3  # change of a number that is written, relative to its size
 
@@ -31,8 +31,11 @@ def corrected(arm: Robot, links: Links, theta: np.ndarray, friction: np.ndarray,
         inertial = None if link is None else link.find("inertial")
         if inertial is None or (np.abs(new - old) <= _CHANGED * size).all():
             continue
-        for tag, attributes in inertial_texts(new).items():
-            _set(inertial, tag, attributes, rewritten)
+        m, c, I = centred(new)  # noqa: E741
+        _set(inertial, "mass", {"value": f"{m:.8g}"}, rewritten)
+        _set(inertial, "origin", {"xyz": " ".join(f"{x:.8g}" for x in c), "rpy": "0 0 0"}, rewritten)
+        moments = {f"i{'xyz'[i]}{'xyz'[j]}": f"{I[i, j]:.8g}" for i in range(3) for j in range(i, 3)}
+        _set(inertial, "inertia", moments, rewritten)
     for joint, viscous, coulomb in zip(arm.joint_names, *friction, strict=True):
         if (element := document.named("joint", joint)) is not None:
             _set(element, "dynamics", {"damping": f"{viscous:.5g}", "friction": f"{coulomb:.5g}"}, rewritten)

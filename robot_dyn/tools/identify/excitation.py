@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 State = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-KINDS = "lower", "upper", "velocity", "acceleration", "torque"
+_QUANTITIES = "position", "velocity", "acceleration", "torque", "box"
 LONGER_S = 10.0  # [s]: the additional time whose gain is reported
 _BANDWIDTH_HZ = 0.5  # highest frequency of the series by default
 _PER_PERIOD = 20  # rows and knots in the shortest period
@@ -57,7 +57,6 @@ _CENTRES, _MIDDLE, _ROOM = 1000, 0.6, 0.9  # mean positions tried, their part of
 _REDUCTIONS, _REDUCED = 200, 1.001
 _NOISE = 0.01  # fraction of the torque limit
 _SLOW = 0.05  # fraction of the velocity limit, or of 1 rad/s: below it, Coulomb friction is smooth
-_TURN = np.pi  # [rad]: range of a joint without limits, to each side
 _RANGE = 1e-6, 1e6  # range of limits and noise: squares and ratios do not overflow
 _TABLE = FileKind("a table of a motion", ".csv", b"t [s],q ")
 
@@ -174,26 +173,26 @@ def excite(
     harmonics = usual if harmonics is None else integer("harmonics", harmonics, least=2, most=500, error=PlanError)
     rate_hz = float(_within("rate_hz", rate_hz, (1.0, 1e4)))
     starts = integer("starts", starts, least=1, most=100, error=PlanError)
-    seed, compare_longer = (
-        integer("seed", seed, most=2**63, error=PlanError),
-        truth("compare_longer", compare_longer, error=PlanError),
-    )
-    bounds = _limits(arm, {} if limits is None else limits, float(_within("fraction", fraction, (0.01, 1.0))))
-    stated = np.where(np.isfinite(bounds["torque"]), _NOISE * bounds["torque"] / fraction, 1.0)
-    sigma = stated if noise is None else _within("noise", noise, _RANGE, (arm.n,))
-    slow = np.where(np.isfinite(bounds["velocity"]), _SLOW * bounds["velocity"], _SLOW)
-    information = Information(arm, base_parameters(arm), np.broadcast_to(sigma, arm.n), slow)
-    problem = Problem(information, FourierSeries(duration_s, harmonics), bounds, _region(arm, box, tool))
+    seed = integer("seed", seed, most=2**63, error=PlanError)
+    middle, half = _limits(arm, {} if limits is None else limits, float(_within("fraction", fraction, (0.01, 1.0))))
+    _, velocity, acceleration, torque = np.split(half, 4)
+    if noise is None:
+        noise = np.where(np.isfinite(torque), _NOISE * torque / fraction, 1.0)
+    sigma = np.broadcast_to(_within("noise", noise, _RANGE, (arm.n,)), arm.n)
+    information = Information(arm, base_parameters(arm), sigma, _SLOW * np.where(velocity < np.inf, velocity, 1.0))
+    frame, centre, edges = _box(arm, box, tool)
+    bounds = np.append(middle, centre), np.append(half, edges)
+    problem = Problem(information, FourierSeries(duration_s, harmonics), *bounds, frame)
     x, random = problem.best(starts, seed)
     longer = None
-    if compare_longer:
+    if truth("compare_longer", compare_longer, error=PlanError):
         whole = duration_s + LONGER_S
         again = replace(problem, series=FourierSeries(whole, round(harmonics * whole / duration_s)))
         longer = again.expected(again.best(1, seed)[0], rate_hz)
     plan = Plan(
         *(arm.name, arm.joint_names, arm.joint_types, problem.reference(x)),
         f"excitation by {harmonics} harmonics of {1 / duration_s:g} Hz, best of {starts} starts",
-        {name: bounds[name] for name in ("velocity", "acceleration", "torque")},
+        {"velocity": velocity, "acceleration": acceleration, "torque": torque},
     )
     best_random = problem.expected(random, rate_hz).log_det
     return Excitation(plan, problem.expected(x, rate_hz), longer, best_random, information.base.blind, rate_hz)
@@ -201,30 +200,23 @@ def excite(
 
 @final
 @dataclass(frozen=True, eq=False)
-class Region:
-    """A box for the origin of a frame: middle and half of its edges, (3,), in [m]."""
-
-    frame: str
-    middle: np.ndarray
-    half: np.ndarray
-
-
-@final
-@dataclass(frozen=True, eq=False)
 class Problem:
     """The optimisation over the coefficients x, (size, n), of the series of all joints.
+
+    Limits are |u − middle| ≤ half for each row u = (q, v, a, τ, p), (c,), p of the frame in the box, if there is one.
 
     Attributes:
         information: Information of motions of the arm.
         series: The series of one joint.
-        bounds: Limits by kind, (n,).
-        region: Box for a frame, or None.
+        middle, half: Limits, (c,).
+        frame: Link or joint that stays in a box, or None.
     """
 
     information: Information
     series: FourierSeries
-    bounds: Mapping[str, np.ndarray]
-    region: Region | None
+    middle: np.ndarray
+    half: np.ndarray
+    frame: str | None = None
 
     @cached_property
     def basis(self) -> State:
@@ -243,7 +235,7 @@ class Problem:
     def reference(self, x: np.ndarray) -> PiecewisePolynomial:
         """Return the motion through 20 knots in the shortest period, with velocities and accelerations."""
         t = np.linspace(0.0, self.series.duration_s, _PER_PERIOD * self.series.harmonics + 1)
-        return Samples(t, *_motion(x, self.series.basis(t)))
+        return Samples(t, *motion(x, self.series.basis(t)))
 
     def expected(self, x: np.ndarray, rate_hz: float) -> ExpectedPrecision:
         """Return the precision of a log of the motion."""
@@ -258,19 +250,17 @@ class Problem:
 
     def log_det(self, x: np.ndarray) -> float:
         """Return log det of the information matrix."""
-        sign, value = np.linalg.slogdet(gram(self.information.rows(*_motion(x, self.basis))))
+        sign, value = np.linalg.slogdet(gram(self.information.rows(*motion(x, self.basis))))
         return float(value) if sign > 0 else -np.inf
 
     def random(self, rng: np.random.Generator) -> np.ndarray:
         """Return a random series, as large as the limits allow, with mean positions within 60 % of the range."""
         n = self.information.arm.n
-        x = rng.normal(size=(self.series.size, n))
+        x, centre = rng.normal(size=(self.series.size, n)), self._centre(rng)
         x[0] = 0.0
-        largest = np.abs(_motion(x, self.basis)).max(axis=1)  # of each |q|, |v| and |a|
-        middle, half = self._range
-        centre = self._centre(rng)
-        room = np.stack([half - np.abs(centre - middle), self.bounds["velocity"], self.bounds["acceleration"]])
-        x *= (room / largest).min(axis=0)
+        largest = np.hstack([np.abs(part).max(axis=0) for part in motion(x, self.basis)])
+        room = self.half[: 3 * n] - np.abs(np.append(centre, np.zeros(2 * n)) - self.middle[: 3 * n])
+        x *= (room / largest).reshape(3, n).min(axis=0)
         x[0] = centre
         return self.within(x, self.basis)  # pyright: ignore[reportReturnType] # rest at the centre is within limits
 
@@ -280,22 +270,23 @@ class Problem:
         Raises:
             PlanError: If none of 1000 is within the limits.
         """
-        middle, half = self._range
-        q = middle + rng.uniform(-_MIDDLE, _MIDDLE, (_CENTRES, len(half))) * half
-        uses = {name: np.abs(use).max(axis=1) for name, use in self._uses((q, 0 * q, 0 * q)).items()}
-        free = np.flatnonzero(np.max(list(uses.values()), axis=0) <= _ROOM)
+        n = self.information.arm.n
+        q = self.middle[:n] + rng.uniform(-_MIDDLE, _MIDDLE, (_CENTRES, n)) * self.half[:n]
+        uses = np.abs(self.uses((q, 0 * q, 0 * q)))
+        free = np.flatnonzero(uses.max(axis=1) <= _ROOM)
         if not len(free):
-            name, use = max(((name, float(use.min())) for name, use in uses.items()), key=lambda item: item[1])
+            tightest = int(uses.min(axis=0).argmax())
             raise PlanError(
                 f"no motion was found within the limits: of {_CENTRES} poses none can rest with room to move; the"
-                f" {name} limit is the tightest, used by {use:.2g} at least; widen it"
+                f" {_QUANTITIES[tightest // n]} limit is the tightest, used by {uses[:, tightest].min():.2g} at least;"
+                " widen it"
             )
         return q[free[0]]
 
     def within(self, x: np.ndarray, basis: State) -> np.ndarray | None:
         """Return the motion with its amplitude reduced until it is within all limits; None if that does not suffice."""
         for _ in range(_REDUCTIONS):
-            use = max(float(np.abs(part).max()) for part in self._uses(_motion(x, basis)).values())
+            use = float(np.abs(self.uses(motion(x, basis))).max())
             if use <= 1.0:
                 return x
             x = np.concatenate([x[:1], x[1:] / (_REDUCED * use)])
@@ -305,67 +296,42 @@ class Problem:
         """Return a local maximum from x, by L-BFGS on an augmented Lagrangian whose penalty doubles each round."""
         from scipy.optimize import minimize
 
-        start = self.within(x, self.fine_basis)
-        multipliers = {name: np.zeros((2, *use.shape)) for name, use in self._uses(_motion(x, self.basis)).items()}
+        start, options = self.within(x, self.fine_basis), {"maxiter": _STEPS, "maxcor": 20}
+        multipliers = np.zeros((2, len(self.basis[0]), len(self.half)))
         for penalty in _PENALTIES:
-            options = {"maxiter": _STEPS, "maxcor": 20}
-            found = minimize(self._lagrangian, x.ravel(), (multipliers, penalty), "L-BFGS-B", jac=True, options=options)
-            x = found.x.reshape(x.shape)
-            uses = self._uses(_motion(x, self.basis))
-            multipliers = {name: _multipliers(use, multipliers[name], penalty) for name, use in uses.items()}
+            args = multipliers, penalty
+            x = minimize(self.lagrangian, x.ravel(), args, "L-BFGS-B", jac=True, options=options).x.reshape(x.shape)
+            multipliers = _multipliers(self.uses(motion(x, self.basis)), *args)
         end = self.within(x, self.fine_basis)
         return max((y for y in (start, end) if y is not None), key=self.log_det)
 
-    def _lagrangian(
-        self, flat: np.ndarray, multipliers: Mapping[str, np.ndarray], penalty: float
-    ) -> tuple[float, np.ndarray]:
+    def lagrangian(self, flat: np.ndarray, multipliers: np.ndarray, penalty: float) -> tuple[float, np.ndarray]:
         """Return −log det A + Σ (μ² − λ²)/(2ρ), μ = max(0, λ + ρ c) for each limit c ≤ 0, and its derivative by x."""
-        x = flat.reshape(self.series.size, -1)
-        q, v, a = state = _motion(x, self.basis)
-        W = self.information.rows(q, v, a)
+        state = motion(flat.reshape(self.series.size, -1), self.basis)
+        W = self.information.rows(*state)
         A = gram(W)
         sign, log_det = np.linalg.slogdet(A)
         if sign <= 0:
             return np.inf, np.zeros_like(flat)
-        value, weights = -log_det, {}
-        for name, use in self._uses(state).items():
-            new = _multipliers(use, multipliers[name], penalty)
-            value += ((new**2).sum() - (multipliers[name] ** 2).sum()) / (2 * penalty)
-            weights[name] = new[0] - new[1]
-        by_q, by_v, by_a = self.information.slope(state, W, A, -weights["torque"] / self.bounds["torque"])
-        by_q = weights["position"] / self._range[1] - by_q
-        by_v = weights["velocity"] / self.bounds["velocity"] - by_v
-        by_a = weights["acceleration"] / self.bounds["acceleration"] - by_a
-        if self.region is not None:
-            J = self.information.compiled.jacobian(q, self.region.frame)[:, :3]
-            by_q = by_q + np.einsum("mij,mi->mj", J, weights["box"] / self.region.half)
-        slope = sum(B.T @ part for B, part in zip(self.basis, (by_q, by_v, by_a), strict=True))
-        return float(value), np.ravel(slope)
+        new = _multipliers(self.uses(state), multipliers, penalty)
+        value = ((new**2).sum() - (multipliers**2).sum()) / (2 * penalty) - log_det
+        n = self.information.arm.n
+        *by_state, by_torque, by_place = np.split((new[0] - new[1]) / self.half, [n, 2 * n, 3 * n, 4 * n], axis=1)
+        slopes = [x - y for x, y in zip(by_state, self.information.slope(state, W, A, -by_torque), strict=True)]
+        if self.frame is not None:
+            J = self.information.compiled.jacobian(state[0], self.frame)[:, :3]
+            slopes[0] += np.einsum("mij,mi->mj", J, by_place)
+        return float(value), np.ravel(sum(B.T @ slope for B, slope in zip(self.basis, slopes, strict=True)))
 
-    @property
-    def _range(self) -> tuple[np.ndarray, np.ndarray]:
-        """Middle and half of the range of each joint, (n,)."""
-        lower, upper = self.bounds["lower"], self.bounds["upper"]
-        return (lower + upper) / 2, (upper - lower) / 2
-
-    def _uses(self, state: State) -> dict[str, np.ndarray]:
-        """Return the signed use of each limit, −1 to 1 within it, (m, n), by kind."""
-        q, v, a = state
-        middle, half = self._range
-        tau = self.information.compiled.inverse_dynamics(q, v, a)
-        uses = {
-            "position": (q - middle) / half,
-            "velocity": v / self.bounds["velocity"],
-            "acceleration": a / self.bounds["acceleration"],
-            "torque": tau / self.bounds["torque"],
-        }
-        if self.region is not None:
-            p = self.information.compiled.placement(q, self.region.frame)[:, :3, 3]
-            uses["box"] = (p - self.region.middle) / self.region.half
-        return uses
+    def uses(self, state: State) -> np.ndarray:
+        """Return the signed use of each limit, −1 to 1 within it, (m, c)."""
+        limited = [*state, self.information.compiled.inverse_dynamics(*state)]
+        if self.frame is not None:
+            limited.append(self.information.compiled.placement(state[0], self.frame)[:, :3, 3])
+        return (np.hstack(limited) - self.middle) / self.half
 
 
-def _motion(x: np.ndarray, basis: State) -> State:
+def motion(x: np.ndarray, basis: State) -> State:
     """Return q, v and a, each (m, n)."""
     position, velocity, acceleration = basis
     return position @ x, velocity @ x, acceleration @ x
@@ -384,42 +350,39 @@ def _within(what: str, values: object, limits: tuple[float, float], *shapes: tup
     return array
 
 
-def _limits(arm: Robot, limits: LimitsInput, fraction: float) -> dict[str, np.ndarray]:
-    """Return the limits by kind, (n,), times the fraction; positions about the middle of their range."""
+def _limits(arm: Robot, limits: LimitsInput, fraction: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle and the half of the range of q, v, a and τ, (4 n,), times the fraction."""
     instance("limits", limits, Mapping, "give limits by kind, such as {'velocity': 1.0}", error=PlanError)
-    for kind in limits:
-        choice("limit", kind, KINDS, error=PlanError)
-    turn = np.full(arm.n, _TURN)
     stated = {
-        "lower": np.where(np.isfinite(arm.lower), arm.lower, -turn),
-        "upper": np.where(np.isfinite(arm.upper), arm.upper, turn),
+        "lower": np.where(np.isfinite(arm.lower), arm.lower, -np.pi),
+        "upper": np.where(np.isfinite(arm.upper), arm.upper, np.pi),
         "velocity": np.where(arm.velocity_limit > 0, arm.velocity_limit, np.inf),
         "acceleration": np.full(arm.n, np.inf),
         "torque": np.where(arm.effort_limit > 0, arm.effort_limit, np.inf),
     }
     for kind, values in limits.items():
+        choice("limit", kind, stated, error=PlanError)
         if isinstance(values, Mapping):
             for joint in values:
                 choice("joint", joint, arm.joint_names, error=PlanError)
             values = [values.get(name, old) for name, old in zip(arm.joint_names, stated[kind], strict=True)]
         low = -_RANGE[1] if kind in ("lower", "upper") else _RANGE[0]
         stated[kind] = np.broadcast_to(_within(kind, values, (low, np.inf), (arm.n,)), arm.n)
-    middle, half = (stated["lower"] + stated["upper"]) / 2, (stated["upper"] - stated["lower"]) / 2
-    for name, size in zip(arm.joint_names, half, strict=True):
-        if not _RANGE[0] < size < _RANGE[1]:
-            raise PlanError(f"joint {name!r} has a range of {2 * size:g}; give finite limits with lower below upper")
-    bounds = {kind: fraction * values for kind, values in stated.items()}
-    return bounds | {"lower": middle - fraction * half, "upper": middle + fraction * half}
+    lower, upper, *others = stated.values()
+    for name, size in zip(arm.joint_names, upper - lower, strict=True):
+        if not _RANGE[0] < size / 2 < _RANGE[1]:
+            raise PlanError(f"joint {name!r} has a range of {size:g}; give finite limits with lower below upper")
+    middle = np.append((lower + upper) / 2, np.zeros(3 * arm.n))
+    return middle, fraction * np.concatenate([(upper - lower) / 2, *others])
 
 
-def _region(arm: Robot, box: ArrayLike | None, tool: str | None) -> Region | None:
-    """Return the box for the tool, checked."""
+def _box(arm: Robot, box: ArrayLike | None, tool: str | None) -> tuple[str | None, np.ndarray, np.ndarray]:
+    """Return the frame in the box, its middle and the half of its edges; None and empty arrays without a box."""
     if tool is not None:
         choice("tool", tool, arm.frame_names, error=PlanError)
     if box is None:
-        return None
+        return None, np.zeros(0), np.zeros(0)
     lower, upper = numbers("box", box, (2, 3), error=PlanError)
     if not (lower + _RANGE[0] < upper).all() or max(np.abs(lower).max(), np.abs(upper).max()) > _RANGE[1]:
         raise PlanError(f"box: the lower corner {lower.tolist()} must be below the upper one {upper.tolist()}")
-    frame = choice("tool", tool, arm.frame_names, error=PlanError)
-    return Region(frame, (lower + upper) / 2, (upper - lower) / 2)
+    return choice("tool", tool, arm.frame_names, error=PlanError), (lower + upper) / 2, (upper - lower) / 2

@@ -10,19 +10,21 @@ depend on axes and units; a mass twice as large, with the same shape, has distan
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from robot_dyn import Robot
-from robot_dyn.description import StatedLink, structure_of, unit_inertias
+from robot_dyn import ModelWarning, Robot
 from robot_dyn.description import parameters as parameters_of
-from robot_dyn.foundations import Value, adjoint_inverse, needs, read_only, rotation_rpy
+from robot_dyn.description import structure_of, unit_inertias
+from robot_dyn.foundations import Value, adjoint_inverse, hat, needs, read_only
 from robot_dyn.tools.identify.log import LogError
 
 SPREAD = 0.5  # σ: distance from the file that counts as much as one standard error of a base parameter
-_MARGIN = 1e-6  # least eigenvalue of P, in units of the link
+MARGIN = 1e-6  # least eigenvalue of P, in units of the link
 _LEAST_M = 0.02  # [m]: least size of a link
 
 
@@ -63,46 +65,31 @@ def links_of(arm: Robot) -> Links:
     edits = arm.edits
     if edits.payloads or edits.mass_scale != 1.0 or edits.mass_scales or edits.masses or edits.inertias:
         raise LogError("the arm has payloads or edited masses: identify the arm of its file; use payload() for a load")
-    structure, E = structure_of(arm.description, edits), unit_inertias(np.dtype(float))
-    q, names, theta, X, rest = np.zeros(arm.n), [], [], [], []
-    body_theta = arm.inertial_parameters.reshape(-1, 10)
-    for body, whole in zip(arm.body_names, body_theta, strict=True):
-        heaviest = max(structure.bodies[body], key=lambda link: structure.links[link].mass)
-        g = np.linalg.inv(arm.placement(q, body)) @ arm.placement(q, heaviest)
-        A = adjoint_inverse(g[:3, :3], g[:3, 3])
-        names.append(heaviest)
-        X.append(np.stack([parameters_of(A.T @ unit @ A) for unit in E], axis=1))
-        theta.append(stated_parameters(arm, heaviest))
-        rest.append(whole - X[-1] @ theta[-1])
-    return Links(tuple(names), np.array(theta), np.array(X), np.array(rest))
+    structure, q = structure_of(arm.description, edits), np.zeros(arm.n)
+    names = tuple(max(structure.bodies[body], key=lambda x: structure.links[x].mass) for body in arm.body_names)
+    twice = {name: 2.0 for name in names if structure.links[name].mass}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        doubled = arm.with_(mass_scales=twice).inertial_parameters if twice else arm.inertial_parameters
+    X = np.stack([seen_from(arm, q, body, name) for body, name in zip(arm.body_names, names, strict=True)])
+    bodies, own = arm.inertial_parameters.reshape(-1, 10), (doubled - arm.inertial_parameters).reshape(-1, 10)
+    return Links(names, np.linalg.solve(X, own[..., None])[..., 0], X, bodies - own)
 
 
-def stated_parameters(arm: Robot, link: str) -> np.ndarray:
-    """Return the parameters of a link in its frame as its file states them, (10,)."""
-    for element in arm.description.element.iterfind("link"):
-        inertial = element.find("inertial")
-        if element.get("name") != link or inertial is None:
-            continue
-        origin, moments = inertial.find("origin"), inertial.find("inertia")
-        c, rpy = (np.array(origin.get(key).split(), float) for key in ("xyz", "rpy"))
-        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = (float(moments.get(k)) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-        R, m = rotation_rpy(rpy), float(inertial.find("mass").get("value"))
-        I = R @ np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]) @ R.T  # noqa: E741
-        I = I + m * (c @ c * np.eye(3) - np.outer(c, c))  # noqa: E741
-        return np.array([m, *(m * c), I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2]])
-    return np.zeros(10)
+def seen_from(arm: Robot, q: np.ndarray, body: str, link: str) -> np.ndarray:
+    """Return the matrix from parameters in the frame of a link to those in the frame of a body, (10, 10)."""
+    g = np.linalg.inv(arm.placement(q, body)) @ arm.placement(q, link)
+    A = adjoint_inverse(g[:3, :3], g[:3, 3])
+    return np.stack([parameters_of(A.T @ unit @ A) for unit in unit_inertias(np.dtype(float))], axis=1)
 
 
 def pseudo_inertia(theta: np.ndarray) -> np.ndarray:
     """Return P, (4, 4), of parameters (10,)."""
-    return np.array(_entries(theta))
-
-
-def _entries(theta: Any) -> list[list[Any]]:
-    """Return the entries of P of parameters (10,), numbers or expressions of cvxpy."""
-    m, x, y, z, Ixx, Ixy, Iyy, Ixz, Iyz, Izz = (theta[k] for k in range(10))
+    m, x, y, z, Ixx, Ixy, Iyy, Ixz, Iyz, Izz = theta
     half = (Ixx + Iyy + Izz) / 2
-    return [[half - Ixx, -Ixy, -Ixz, x], [-Ixy, half - Iyy, -Iyz, y], [-Ixz, -Iyz, half - Izz, z], [x, y, z, m]]
+    return np.array(
+        [[half - Ixx, -Ixy, -Ixz, x], [-Ixy, half - Iyy, -Iyz, y], [-Ixz, -Iyz, half - Izz, z], [x, y, z, m]]
+    )
 
 
 def nearest_possible(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -112,26 +99,40 @@ def nearest_possible(links: Links, R: np.ndarray, values: np.ndarray, covariance
         LogError: If the solver finds none.
         MissingExtraError: If cvxpy or clarabel is not installed.
     """
-    cp: Any = needs("cvxpy", extra="identify")
-    needs("clarabel", extra="identify")
+    return nearest_bodies(*distance(links, R, values, covariance)).reshape(-1, 10) * links.sizes
+
+
+def distance(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return A and b of the objective ‖A x − b‖², with x = θ in units of the sizes, (10 N,)."""
     N, sizes = len(links.names), links.sizes
     L = np.linalg.cholesky(np.linalg.inv(covariance)).T
-    A = np.einsum("rbk,bkj->rbj", R.reshape(len(R), N, 10), links.X)
-    constant = R @ links.rest.ravel() - values
-    x = cp.Variable((N, 10))  # in units of the sizes
-    data = L @ (A.reshape(len(R), -1) * sizes.ravel()) @ cp.reshape(x, (10 * N,), order="C") + L @ constant
-    objective = cp.sum_squares(data)
-    for i in range(N):
-        objective += cp.sum_squares(_metric(links.theta[i], sizes[i]) @ (x[i] - links.theta[i] / sizes[i])) / SPREAD**2
-    possible = [cp.bmat(_entries(x[i])) >> _MARGIN * np.eye(4) for i in range(N)]
-    problem = cp.Problem(cp.Minimize(objective), possible)
+    to_base = np.einsum("rbk,bkj->rbj", R.reshape(len(R), N, 10), links.X) * sizes
+    metric = np.asarray(block_diag(*map(_metric, links.theta, sizes))) / SPREAD
+    b = np.concatenate([L @ (values - R @ links.rest.ravel()), metric @ (links.theta / sizes).ravel()])
+    return np.vstack([L @ to_base.reshape(len(R), -1), metric]), b
+
+
+def nearest_bodies(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the parameters of possible bodies, (10 N,) in units of their sizes, that minimise ‖A x − b‖².
+
+    Raises:
+        LogError: If the solver finds none.
+        MissingExtraError: If cvxpy or clarabel is not installed.
+    """
+    cp: Any = needs("cvxpy", extra="identify")
+    needs("clarabel", extra="identify")
+    x, units = cp.Variable(A.shape[1]), np.stack([pseudo_inertia(unit).ravel() for unit in np.eye(10)], axis=1)
+    possible = [
+        cp.reshape(units @ x[k : k + 10], (4, 4), order="C") >> MARGIN * np.eye(4) for k in range(0, len(A.T), 10)
+    ]
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(A @ x - b)), possible)
     try:
         problem.solve(solver=cp.CLARABEL)
     except cp.SolverError:
         x.value = None
     if x.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
         raise LogError(f"no possible bodies fit the log ({problem.status}); check the arm and the units of the torques")
-    return np.asarray(x.value) * sizes
+    return np.asarray(x.value)
 
 
 def _metric(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -143,14 +144,8 @@ def _metric(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
     return np.stack([(S @ pseudo_inertia(unit) @ S).ravel() for unit in np.diag(size)], axis=1)
 
 
-def inertial_texts(theta: np.ndarray, stated: StatedLink | None = None) -> dict[str, dict[str, str]]:
-    """Return the attributes of the elements of <inertial> for parameters (10,) of a link."""
-    m, c = theta[0], theta[1:4] / theta[0]
+def centred(theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return mass, centre of mass, (3,), and moments of inertia about it, (3, 3), of parameters (10,)."""
+    m, c = float(theta[0]), theta[1:4] / theta[0]
     Ixx, Ixy, Iyy, Ixz, Iyz, Izz = theta[4:]
-    I = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]) - m * (c @ c * np.eye(3) - np.outer(c, c))  # noqa: E741
-    text = lambda x: f"{x:.8g}"  # noqa: E731
-    return {
-        "mass": {"value": text(m)},
-        "origin": {"xyz": " ".join(map(text, c)), "rpy": "0 0 0"},
-        "inertia": {f"i{'xyz'[i]}{'xyz'[j]}": text(I[i, j]) for i in range(3) for j in range(i, 3)},
-    }
+    return m, c, np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]) + m * hat(c) @ hat(c)

@@ -14,6 +14,7 @@ from robot_dyn.control import PiecewisePolynomial, extreme_values
 from robot_dyn.effects import EffortLimit, RigidStops
 from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
 from robot_dyn.queries import of_joint
+from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.torque_speed import TorqueSpeed
 
@@ -38,6 +39,7 @@ class Limits:
         continuous: Root mean square of τ, in [N m] or [N].
         line: Peak torque of driving motors by speed; None for none.
         continuous_line: Continuous torque by the mean speed of a motion; None for none.
+        gear: Gears with losses, so that torque limits are those of motors; None for none.
     """
 
     effort: Any = field(default=inf, metadata=coefficient("N m", minimum=0, infinite=True, fill_value=inf))
@@ -46,6 +48,7 @@ class Limits:
     continuous: Any = field(default=inf, metadata=_positive("N m"))
     line: TorqueSpeed | None = None
     continuous_line: TorqueSpeed | None = None
+    gear: Gear | None = None
 
     def __post_init__(self) -> None:
         check_coefficients(self, PlanError, allow_unresolved=True)
@@ -62,12 +65,19 @@ class Limits:
             raise PlanError(str(error)) from None
         return replace(self, **{name: np.broadcast_to(np.asarray(x), dynamics.n) for name, x in by_joint.items()})
 
-    def times(self, torque: float, rates: float = 1.0) -> Limits:
+    def times(self, torque: float | np.ndarray, rates: float = 1.0) -> Limits:
         """Return the limits with peak torques times one factor, velocities and accelerations times another."""
         return replace(
             self, effort=torque * self.effort, velocity=rates * self.velocity, acceleration=rates * self.acceleration,
             line=self.line and self.line.times(torque),
         )  # fmt: skip
+
+    def through_gear(self) -> Limits:
+        """Return limits of the torque at the joint that a driving motor can supply, η times its own.
+
+        A motor that is driven back could hold up to 1/η times its own, which these limits leave unused.
+        """
+        return self if self.gear is None else replace(self.times(self.gear.efficiency), gear=None)
 
     def bounds(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the smallest and largest torque of the motors at velocities v, (..., n) each."""
@@ -109,11 +119,20 @@ def limits_of(
     if motors is not None:
         limits = replace(
             limits,
+            gear=_gear(motors, robot),
             line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
             continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),
         )
     saturates = [np.broadcast_to(effect.limit, robot.n) for effect in plant.effects if isinstance(effect, EffortLimit)]
     return replace(limits, effort=np.minimum.reduce([limits.effort, *saturates]))
+
+
+def _gear(motors: Motors, robot: Any) -> Gear | None:
+    """Return the gears of an arm with its motors; None without losses."""
+    if not motors.efficiency:
+        return None
+    efficiency = np.array([motors.efficiency.get(name, 1.0) for name in robot.joint_names])
+    return Gear(efficiency, np.asarray(getattr(robot, "armature", np.zeros(robot.n))))
 
 
 def _stated(robot: Any, kind: str) -> Any:

@@ -6,6 +6,7 @@
 Torques and speeds are at the joint, or at the motor shaft if the column `at` is "motor": the gear ratio then multiplies
 the torque and divides the speed. A rotor adds the inertia ratio² · rotor_inertia at the joint. A joint with several
 lines has a motor whose torques fall with speed: each line is a corner of its torque–speed line, see `Motors.line`.
+A column `efficiency` states the losses of gears, for torques at the motor.
 [Siciliano et al. 2009, sec. 5.2]
 """
 
@@ -38,6 +39,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "speed": _SPEED,
     "gear_ratio": {"": 1.0},
     "rotor_inertia": _INERTIA,
+    "efficiency": {"": 1.0, "%": 0.01},
 }
 _OF_CORNERS = "speed", "peak", "continuous"  # may be 0 at a corner
 
@@ -58,6 +60,8 @@ class Motors:
         source: Path of the file.
         line: Peak torque by speed.
         continuous_line: Continuous torque by mean speed.
+        efficiency: η of the gear, above 0 and at most 1: driving motors supply 1/η of the torque through the gear, and
+            motors that are driven back supply η of it. Joints without a value have gears without losses.
     """
 
     peak: Mapping[str, float]
@@ -67,6 +71,7 @@ class Motors:
     source: str = field(default="motors")
     line: Mapping[str, Points] = field(default_factory=dict)
     continuous_line: Mapping[str, Points] = field(default_factory=dict)
+    efficiency: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def limit(self) -> TorqueSpeedLimit:
@@ -90,16 +95,19 @@ class Motors:
 def read_motors(path: str | Path) -> Motors:
     """Read the motors of a CSV file; the first line names the columns, with units in brackets.
 
-    Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], at. All except
-    `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and [m/s]; speeds may be in
-    [rpm] or [deg/s]. `at` is "joint" or "motor", the place of torques and speeds; it is required with gear ratios.
+    Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], efficiency, at. All
+    except `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and [m/s]; speeds may be
+    in [rpm] or [deg/s], efficiencies in [%]. `at` is "joint" or "motor", the place of torques and speeds; it is
+    required with gear ratios. An efficiency needs torques at the motor: those at the joint contain the loss.
 
     Several lines of one joint are the corners of its torque–speed line, with increasing speeds and peaks that do not
-    increase; those with a continuous torque are the corners of a second line. The first states at, gear and rotor.
+    increase; those with a continuous torque are the corners of a second line. The first states at, gear, rotor and
+    efficiency.
 
     Raises:
         PlanError: If the file cannot be read, a column or unit is unknown, an entry is not a positive number, corners
-            are not a torque–speed line, or a speed above 100 rad/s is at the joint.
+            are not a torque–speed line, a speed above 100 rad/s is at the joint, or an efficiency is above 1 or of
+            torques at the joint.
     """
     lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …", skip_blank=True)
     heads = _heads(path, next(lines)[1])
@@ -112,7 +120,7 @@ def read_motors(path: str | Path) -> Motors:
     rows = [_motor(joint) for joint in corners.values()]
     columns = {
         key: {row["joint"]: row[key] for row in rows if row.get(key)}
-        for key in ("peak", "continuous", "speed", "armature", "line", "continuous_line")
+        for key in ("peak", "continuous", "speed", "armature", "line", "continuous_line", "efficiency")
     }
     return Motors(**columns, source=str(path))
 
@@ -149,7 +157,12 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     at, ratio = first["at"] or AT[0], first.get("gear_ratio", 1.0)
     for row in rows[1:]:
         if other := next(
-            (x for x in ("at", "gear_ratio", "rotor_inertia") if row.get(x, "") not in ("", first.get(x))), ""
+            (
+                x
+                for x in ("at", "gear_ratio", "rotor_inertia", "efficiency")
+                if row.get(x, "") not in ("", first.get(x))
+            ),
+            "",
         ):
             raise PlanError(f"{row['where']}: {joint!r} has another {other} in its first line; keep that one")
     if at not in AT:
@@ -157,6 +170,13 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     if "gear_ratio" not in first and (at == "motor" or "rotor_inertia" in first):
         subject = "values at the motor need" if at == "motor" else "a rotor_inertia needs"
         raise PlanError(f"{where}: {subject} a gear_ratio; give 1 without a gear")
+    if (efficiency := first.get("efficiency", 1.0)) > 1:
+        raise PlanError(f"{where}: efficiency must be at most 1, got {efficiency:g}; write percent as 'efficiency [%]'")
+    if "efficiency" in first and at != "motor":
+        raise PlanError(
+            f"{where}: torques at the joint contain the losses of the gear; leave efficiency empty, or state torques at"
+            " the motor"
+        )
     for row in rows:
         for name in (x for x in _UNITS if row.get(x) == 0 and (len(rows) == 1 or x not in _OF_CORNERS)):
             raise PlanError(f"{row['where']}: {name} must be a positive number, got 0")
@@ -170,6 +190,7 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     N = ratio if at == "motor" else 1.0
     motor = {name: N * first[name] for name in ("peak", "continuous") if name in first}
     motor |= {"joint": joint, "armature": ratio**2 * first.get("rotor_inertia", 0.0)}
+    motor |= {"efficiency": efficiency} if efficiency < 1 else {}
     if "speed" in first:
         motor["speed"] = rows[-1]["speed"] / N
     for name, line in (("peak", "line"), ("continuous", "continuous_line")):

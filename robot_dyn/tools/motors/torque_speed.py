@@ -48,9 +48,9 @@ class TorqueSpeed:
         """True for joints with a line, (n,)."""
         return np.isfinite(self.torque[:, 0])
 
-    def times(self, factor: float) -> TorqueSpeed:
-        """Return the lines with other torques."""
-        return replace(self, torque=factor * self.torque)
+    def times(self, factor: float | np.ndarray) -> TorqueSpeed:
+        """Return the lines with torques times a factor, a scalar or (n,)."""
+        return replace(self, torque=np.reshape(factor, (-1, 1)) * self.torque)
 
     def at(self, v: np.ndarray) -> np.ndarray:
         """Return ℓ(|v|), (..., n)."""

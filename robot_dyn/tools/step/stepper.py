@@ -20,12 +20,11 @@ from robot_dyn.foundations import (
     JointValues,
     MissingTimeError,
     QueryError,
-    Value,
+    ReadOnly,
     duration,
     instance,
     integer,
     joint_values,
-    read_only,
     shaped,
     shown,
     truth,
@@ -38,7 +37,7 @@ from robot_dyn.tools.step.action import action_of
 
 @final
 @dataclass(frozen=True, eq=False)
-class State(Value):
+class State(ReadOnly):
     """The state of n lanes.
 
     Attributes:
@@ -54,9 +53,6 @@ class State(Value):
     v: np.ndarray
     z: np.ndarray
     diverged: np.ndarray
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
 
 @final

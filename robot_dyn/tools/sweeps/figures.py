@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn import Rollouts, Setup
 from robot_dyn.control import CartesianReference
-from robot_dyn.foundations import SweepError, Value, choice, nearest, read_only, shown
+from robot_dyn.foundations import ReadOnly, SweepError, Value, choice, nearest, shown
 from robot_dyn.queries import joint_types_of, joint_units
 from robot_dyn.simulation import tracking_of
 from robot_dyn.tools.sweeps.imported import digest_of, imported, is_import_path, path_of
@@ -27,7 +27,7 @@ _RECORDS = (*_STATES, "energy", "work")
 
 @typing.final
 @dataclass(frozen=True, eq=False)
-class Run(Value):
+class Run(ReadOnly):
     """The recorded data of one run, up to its end, for figures.
 
     Attributes:
@@ -51,9 +51,6 @@ class Run(Value):
     extremes: np.ndarray
     ended_s: float
     varied: dict[str, np.ndarray]
-
-    def __post_init__(self) -> None:
-        read_only(self)
 
 
 @typing.final

@@ -8,5 +8,6 @@ __all__: list[str]
 
 # Names that tests import of this folder.
 from robot_dyn.tools.symbols.letters import Lettering as Lettering
-from robot_dyn.tools.symbols.letters import independent as independent
+from robot_dyn.tools.symbols.letters import body_numbers as body_numbers
+from robot_dyn.tools.symbols.letters import readable as readable
 from robot_dyn.tools.symbols.polynomials import Numbers as Numbers

@@ -14,7 +14,7 @@ from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.foundations import QueryError, first_moment, needs, shown
 from robot_dyn.lagrange import FORMULAS, Linkage, Pose, linkage_of, tree_of
 from robot_dyn.tools.symbols.fourier import expression, shortest
-from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle, independent
+from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle, body_numbers, readable
 from robot_dyn.tools.symbols.polynomials import Letter, Numbers, Polynomials, Turn
 
 if TYPE_CHECKING:
@@ -153,20 +153,21 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     Angles within 1e-5 rad of a multiple of π/12 are read as that multiple, and reported; other angles become letters.
 
     Args:
-        arm: Arm without mimic joints.
+        arm: Arm; mimic joints turn by whole multiples of their drive, or slide with it.
         letters: "file" for a letter for each number of the file; "base" for numbers of the file with a letter for
             gravity and each base inertial parameter, which are fewest; None for numbers only.
 
     Raises:
         MissingExtraError: If SymPy is not installed.
-        QueryError: If the arm has mimic joints, `letters` is unknown, or the equations have more terms than fit.
+        QueryError: If a mimic joint turns by a fraction of its drive, `letters` is unknown, or the equations have more
+            terms than fit.
     """
     needs("sympy", extra="symbols")
     if not isinstance(arm, Robot):
         raise QueryError(f"arm must be a Robot, for example rd.load('ur5'), got {shown(arm)}")
     if letters is not None and not (isinstance(letters, str) and letters in ("file", "base")):
         raise QueryError(f"letters must be 'file', 'base' or None, got {shown(letters)}")
-    tree = independent(tree_of(arm.description, arm.edits))
+    tree = readable(tree_of(arm.description, arm.edits))
     lettering = Lettering(named=letters == "file", with_g=letters is not None)
     lettered = lettering.tree(tree, arm.joint_names)
     meanings = dict(lettering.letters)
@@ -203,11 +204,7 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
         if cause is None:
             raise
         raise _unreadable(f"an intermediate result has {cause}", letters) from None
-    return _named(
-        SymbolicEquations(
-            arm, letters, meanings, tuple(lettering.rounded), results, _parallel(linkage, arm.joint_names)
-        )
-    )
+    return _named(SymbolicEquations(arm, letters, meanings, tuple(lettering.rounded), results, _parallel(linkage)))
 
 
 def _unreadable(size: str, letters: str | None) -> QueryError:
@@ -246,15 +243,16 @@ def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[
     The letters follow Gautier and Khalil (1990): M mass, MX first moment, XX second moment in the joint's frame.
     """
     lettering = Lettering(named=False)  # the same angles as in the formulas, in floats
-    tree = lettering.tree(independent(tree_of(arm.description, arm.edits)), arm.joint_names)
+    tree = lettering.tree(readable(tree_of(arm.description, arm.edits)), arm.joint_names)
     numbers = regrouped(linkage_of(tree, arm.joint_names, Numbers({k: m.value for k, m in lettering.letters.items()})))
     inertias = np.array(numbers.inertias, dtype=float)
     largest = np.abs(inertias).max(axis=0)
     small = SMALL * np.array([[largest[:3, :3].max()] * 3 + [largest[:3, 3:].max()] * 3] * 3
                              + [[largest[:3, 3:].max()] * 3 + [largest[3:, 3:].max()] * 3] * 3)  # fmt: skip
     result = {}
+    indices = body_numbers(tree, arm.joint_names)
     for body, inertia in zip(numbers.bodies, np.where(np.abs(inertias) > small, inertias, 0.0), strict=True):
-        k = arm.joint_names.index(body.joint) + 1
+        k = indices[body.joint]
         values = {f"M{k}": inertia[0, 0]}
         values |= dict(zip((f"MX{k}", f"MY{k}", f"MZ{k}"), first_moment(inertia), strict=True))
         pairs = dict(zip(MOMENTS, zip(*np.triu_indices(3), strict=True), strict=True))
@@ -274,7 +272,7 @@ def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[
     return result
 
 
-def _parallel(linkage: Linkage, joint_names: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+def _parallel(linkage: Linkage) -> tuple[tuple[str, ...], ...]:
     """Return chains of turning joints with parallel axes, by the names of their coordinates."""
     chains: dict[int, list[int]] = {}
     for i, body in enumerate(linkage.bodies):
@@ -285,13 +283,11 @@ def _parallel(linkage: Linkage, joint_names: tuple[str, ...]) -> tuple[tuple[str
         )
         chains[i] = [*chains[body.parent], i] if parallel else [i]
     longest = sorted((chain for chain in chains.values() if len(chain) > 1), key=len, reverse=True)
-    names = [f"q{joint_names.index(body.joint) + 1}" for body in linkage.bodies]
-    seen: set[int] = set()
-    groups = []
+    groups: list[tuple[str, ...]] = []
     for chain in longest:
-        if not seen & set(chain):  # a joint is in one group, also where arms branch
-            seen |= set(chain)
-            groups.append(tuple(names[i] for i in chain))
+        names = tuple(dict.fromkeys(f"q{k + 1}" for k in np.argmax(linkage.couplings.S[chain] != 0, axis=1)))
+        if not any(set(names) & set(group) for group in groups):  # an angle is in one group, also where arms branch
+            groups.append(names)
     return tuple(groups)
 
 

@@ -83,12 +83,12 @@ class Lettering:
     _labels: dict[str, int] = field(default_factory=dict)
 
     def tree(self, tree: Tree, joint_names: tuple[str, ...]) -> Tree:
-        """Return the tree with letters; joints are numbered by their place in q."""
+        """Return the tree with letters; its bodies are numbered by `body_numbers`."""
+        numbers = body_numbers(tree, joint_names)
         body = {tree.root: 0}
         joints = []
         for joint in tree.joints:
-            moves = joint.name in joint_names
-            body[joint.child] = joint_names.index(joint.name) + 1 if moves else body[joint.parent]
+            body[joint.child] = numbers.get(joint.name, body[joint.parent])
             joints.append(self._joint(joint, body))
         links = tuple(
             replace(link, inertials=tuple(self._inertial(part, body[link.name], link.name) for part in link.inertials))
@@ -101,13 +101,10 @@ class Lettering:
     def _joint(self, joint: Joint, body: dict[str, int]) -> Joint:
         where, parent = f"joint {joint.name!r}", body[joint.parent]
         moves = body[joint.child] != parent
-        locked: Any = joint.locked
-        if locked is not None:
-            locked = (
-                self._number(f"d{self._label('d', parent)}", locked, f"locked position of {where}")
-                if joint.kind == "prismatic"
-                else self._angle(locked, f"locked position of {where}")
-            )
+        locked = None if joint.locked is None else self._position(joint, joint.locked, parent, "locked position")
+        mimic = joint.mimic and replace(
+            joint.mimic, offset=self._position(joint, joint.mimic.offset, parent, "mimic offset")
+        )
         xyz = joint.xyz
         if not moves or parent:  # the first joint's place adds a constant to V only
             xyz = self._vector("l", parent, xyz, f"origin of {where}") if any(map(_value, xyz)) else xyz
@@ -118,7 +115,14 @@ class Lettering:
             axis=self._axis(joint.axis, f"axis of {where}") if joint.kind != "fixed" else joint.axis,
             armature=self._number(f"J{body[joint.child]}", joint.armature, f"armature of {where}") if moves else "0",
             locked=locked,
+            mimic=mimic,
         )
+
+    def _position(self, joint: Joint, value: Any, parent: int, what: str) -> Any:
+        where = f"{what} of joint {joint.name!r}"
+        if joint.kind == "prismatic":
+            return self._number(f"d{self._label('d', parent)}", value, where)
+        return self._angle(value, where)
 
     def _inertial(self, part: Inertial, body: int, link: str) -> Inertial:
         where, label = f"link {link!r}", self._label("m", body)
@@ -183,29 +187,37 @@ class Lettering:
         return tuple(Component(azimuth, elevation, k) for k in range(3))
 
 
-def independent(tree: Tree) -> Tree:
-    """Return the tree with mimic joints locked where their drive is locked.
+def body_numbers(tree: Tree, joint_names: tuple[str, ...]) -> dict[str, int]:
+    """Return the number of the body that each moving joint carries: its place in q; mimic joints follow."""
+    mimics = [joint.name for joint in tree.joints if joint.mimic]
+    return {name: k for k, name in enumerate((*joint_names, *mimics), 1)}
+
+
+def readable(tree: Tree) -> Tree:
+    """Return the tree with mimic joints locked where their drive is locked, and fixed ones without a mimic.
 
     Raises:
-        QueryError: If a mimic joint moves.
+        QueryError: If a moving mimic joint has another kind than its drive, or turns by a fraction of its angle.
     """
     by_name = {joint.name: joint for joint in tree.joints}
+    return replace(tree, joints=tuple(_placed(joint, by_name) for joint in tree.joints))
 
-    def position(joint: Joint) -> Fraction:
-        if joint.locked is not None:
-            return _value(joint.locked)
-        if joint.mimic is None:
-            raise QueryError(
-                f"formulas need independent joints, but a joint follows {joint.name!r}: lock both by"
-                f" --lock {joint.name}=0 (in Python arm.with_(lock={{{joint.name!r}: 0.0}})), or remove the <mimic>"
-            )
-        return _value(joint.mimic.multiplier) * position(by_name[joint.mimic.source]) + _value(joint.mimic.offset)
 
-    joints = (
-        replace(joint, locked=position(joint), mimic=None) if joint.mimic and joint.kind != "fixed" else joint
-        for joint in tree.joints
-    )
-    return replace(tree, joints=tuple(joints))
+def _placed(joint: Joint, by_name: dict[str, Joint]) -> Joint:
+    """Return a mimic joint locked, if its drive is; sines and cosines of k q are polynomials for whole numbers k."""
+    if joint.mimic is None or joint.kind == "fixed":
+        return replace(joint, mimic=None)
+    drive, multiplier = _placed(by_name[joint.mimic.source], by_name), _value(joint.mimic.multiplier)
+    if drive.locked is not None:
+        return replace(joint, locked=multiplier * _value(drive.locked) + _value(joint.mimic.offset), mimic=None)
+    slides = joint.kind == "prismatic"
+    if slides != (drive.kind == "prismatic") or not (slides or multiplier.denominator == 1):
+        raise QueryError(
+            f"formulas need mimic joints that turn by whole multiples of their drive, or slide with it, but"
+            f" {joint.name!r} follows {drive.name!r} {float(multiplier):g} times: lock the drive by"
+            f" --lock {drive.name}=0 (in Python arm.with_(lock={{{drive.name!r}: 0.0}})), or remove the <mimic>"
+        )
+    return joint
 
 
 def _value(literal: Any) -> Fraction:

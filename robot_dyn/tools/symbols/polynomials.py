@@ -13,7 +13,7 @@ import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any, SupportsFloat, final
 
 import numpy as np
@@ -152,12 +152,18 @@ class Turn:
         """Return the cosine."""
         return self.c
 
-    # A linkage places a locked joint at 1 · value + 0.
-    def __rmul__(self, one: Polynomial) -> Turn:
-        return self
+    def __add__(self, other: Turn | Polynomial | int) -> Turn:
+        if isinstance(other, Turn):
+            return Turn(self.s * other.c + self.c * other.s, self.c * other.c - self.s * other.s)
+        return self  # NumPy adds angles to 0
 
-    def __add__(self, zero: Polynomial) -> Turn:
-        return self
+    __radd__ = __add__
+
+    def __rmul__(self, multiple: Polynomial) -> Turn:
+        """Return a multiple of the angle; the factor is a whole number and not 0."""
+        (k,) = map(int, multiple.value.coeffs())
+        angle = self if k > 0 else Turn(-self.s, self.c)
+        return reduce(Turn.__add__, [angle] * abs(k))
 
 
 @final

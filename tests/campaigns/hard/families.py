@@ -10,6 +10,7 @@ from tests.campaigns.hard import (
     contact,
     far_out,
     long_runs,
+    nonsmooth_tutorials,
     peer_runs,
     peers,
     sampled_control,
@@ -21,7 +22,7 @@ from tests.campaigns.hard import (
 from tests.campaigns.hard.case import Family
 
 _ALL = (
-    conditioning, far_out, long_runs, stiffness, contact, singularity, sampled_control, chaos, tools, world, peers,
-    peer_runs,
+    conditioning, far_out, long_runs, stiffness, contact, nonsmooth_tutorials, singularity, sampled_control, chaos,
+    tools, world, peers, peer_runs,
 )  # fmt: skip
 FAMILIES: dict[str, Family] = {each.__name__.rpartition(".")[2]: cast("Family", each) for each in _ALL}

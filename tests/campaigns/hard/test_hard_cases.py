@@ -19,7 +19,7 @@ SEED = 1
 ROOT = Path(__file__).parents[3]
 SOME = {  # one of each family
     "spatial, 7 joints", "q of 100000 rad", "double pendulum, RK4, 20000 steps", "damper of 1e+06 N m s/rad",
-    "planar_2r, smooth, scenes 0 to 2", "ur5's elbow 0.1 m beyond", "planar_2r, PID in saturation",
+    "planar_2r, smooth, scenes 0 to 2", "relay", "ur5's elbow 0.1 m beyond", "planar_2r, PID in saturation",
     "double pendulum, RK4", "planar_2r", "double_pendulum", "turning and sliding", "stopped",
 }  # fmt: skip
 ALL = [

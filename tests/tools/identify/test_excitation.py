@@ -13,7 +13,7 @@ from robot_dyn.control import extreme_values
 from robot_dyn.foundations import PlanError
 from robot_dyn.tools.identify import FourierSeries, Information, gram
 from robot_dyn.tools.identify.base_parameters import base_parameters
-from robot_dyn.tools.identify.excitation import Problem, _limits
+from robot_dyn.tools.identify.excitation import Problem, _limits, motion
 
 ARM = rd.load("planar_2r")
 LIMITS = {"velocity": 2.0, "acceleration": 9.0, "torque": 60.0, "lower": -2.0, "upper": 2.0}
@@ -21,7 +21,7 @@ LIMITS = {"velocity": 2.0, "acceleration": 9.0, "torque": 60.0, "lower": -2.0, "
 
 def problem(arm: rd.Robot = ARM, harmonics: int = 5, **limits: float) -> Problem:
     information = Information(arm, base_parameters(arm), np.full(arm.n, 0.5), np.full(arm.n, 0.1))
-    return Problem(information, FourierSeries(10.0, harmonics), _limits(arm, limits or LIMITS, 0.9), None)
+    return Problem(information, FourierSeries(10.0, harmonics), *_limits(arm, limits or LIMITS, 0.9))
 
 
 @cache
@@ -63,16 +63,11 @@ def test_the_slope_of_the_lagrangian_is_its_derivative() -> None:
     """Central difference with h = 1e-5: error O(h²) and rounding 1e-10 · value, together below 1e-6 of the slope."""
     case, rng = problem(), np.random.default_rng(2)
     x = case.random(rng).ravel()
-    multipliers = {name: rng.uniform(0, 3, (2, *use.shape)) for name, use in case._uses(case_motion(case, x)).items()}
+    multipliers = rng.uniform(0, 3, (2, *case.uses(motion(x.reshape(case.series.size, -1), case.basis)).shape))
     direction = rng.normal(size=x.size) / np.sqrt(x.size)
-    above, below = (case._lagrangian(x + s * 1e-5 * direction, multipliers, 30.0)[0] for s in (1, -1))
-    slope = case._lagrangian(x, multipliers, 30.0)[1] @ direction
+    above, below = (case.lagrangian(x + s * 1e-5 * direction, multipliers, 30.0)[0] for s in (1, -1))
+    slope = case.lagrangian(x, multipliers, 30.0)[1] @ direction
     assert (above - below) / 2e-5 == pytest.approx(slope, rel=1e-6)
-
-
-def case_motion(case: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    q, v, a = (B @ x.reshape(case.series.size, -1) for B in case.basis)
-    return q, v, a
 
 
 def test_an_excitation_shows_more_than_random_series() -> None:
@@ -192,7 +187,7 @@ def test_real_arms_gain_as_much(name: str) -> None:
     planned = rd.tools.identify.excite(arm, compare_longer=False)
     base = base_parameters(arm)
     information = Information(arm, base, 0.01 * arm.effort_limit, 0.05 * 0.9 * arm.velocity_limit)
-    case = Problem(information, FourierSeries(20.0, 10), _limits(arm, {}, 0.9), None)
+    case = Problem(information, FourierSeries(20.0, 10), *_limits(arm, {}, 0.9))
     rng = np.random.default_rng(3)
     random = max((case.random(rng) for _ in range(1000)), key=case.log_det)
     gain = planned.expected.log_det - case.expected(random, 100.0).log_det

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
@@ -28,6 +29,7 @@ from robot_dyn.tools.identify import (
     pseudo_inertia,
     read_log,
 )  # fmt: skip
+from robot_dyn.tools.identify.physical import MARGIN, distance, nearest_bodies
 from tests.command import spawn
 from tests.tools.identify import logs
 
@@ -158,6 +160,34 @@ def test_bodies_are_possible_and_equal_the_file_where_the_log_is_blind() -> None
         noisy = base.R @ arm.inertial_parameters + np.random.default_rng(0).normal(size=len(base.R)) * 0.3
         for body in nearest_possible(links, base.R, noisy, np.eye(len(base.R)) * 1e-4):
             assert np.linalg.eigvalsh(pseudo_inertia(body)).min() > 0
+
+
+@pytest.mark.parametrize(("spread", "tolerance"), [(0.1, 1e-6), (0.75, 2e-3)])
+def test_the_nearest_bodies_are_those_of_the_log_cholesky_parametrisation(spread: float, tolerance: float) -> None:
+    """P = MARGIN·1 + U Uᵀ with U_ii = eˣ has no constraints; its least squares have the same optimum.
+
+    Inside, both agree to 1e-6 of the size. Base parameters that are wrong by ±75 % press a body to the edge of P ⪰ 0,
+    where x → −∞: 100 steps leave 1e-5 of the objective and 1e-3 of the size. [Rucker, Wensing 2022]
+    """
+    base, links = model_of(logs.FILE).base, links_of(logs.FILE)
+    own = base.R @ logs.FILE.inertial_parameters
+    factors = np.random.default_rng(2).uniform(1 - spread, 1 + spread, len(own))
+    A, b = distance(links, base.R, factors * own, np.diag((0.05 * np.abs(own)) ** 2 + 1e-6))
+    to_parameters = np.linalg.pinv(np.stack([pseudo_inertia(unit).ravel() for unit in np.eye(10)], axis=1))
+
+    def bodies(x: np.ndarray) -> np.ndarray:
+        U = np.zeros((len(links.names), 4, 4))
+        U[:, range(4), range(4)], U[:, *np.triu_indices(4, 1)] = np.exp(x[:, :4]), x[:, 4:]
+        P = MARGIN * np.eye(4) + U @ U.transpose(0, 2, 1)
+        return (P.reshape(-1, 16) @ to_parameters.T).ravel()
+
+    start = np.tile([*[np.log(0.5)] * 4, *[0.0] * 6], len(links.names))
+    referee = least_squares(lambda x: A @ bodies(x.reshape(-1, 10)) - b, start, max_nfev=100)
+    found = nearest_bodies(A, b)
+    assert ((A @ found - b) ** 2).sum() == pytest.approx(2 * referee.cost, rel=1e-5)
+    assert np.allclose(found, bodies(referee.x.reshape(-1, 10)), atol=tolerance)
+    edge = min(np.linalg.eigvalsh(pseudo_inertia(body))[0] for body in found.reshape(-1, 10)) < 2 * MARGIN
+    assert edge == (spread > 0.5)
 
 
 def test_links_and_the_rest_of_their_bodies_make_up_the_arm() -> None:

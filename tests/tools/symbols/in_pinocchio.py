@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import pinocchio as pin
 import sympy as sp
 
 from robot_dyn.lagrange import Joint, Tree, tree_of
-from robot_dyn.tools.symbols import Lettering, Numbers, SymbolicEquations, independent
+from robot_dyn.tools.symbols import Lettering, Numbers, SymbolicEquations, body_numbers, readable
 
 Matrices = dict[str, np.ndarray]
 BASE = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")  # in the order of Pinocchio's parameters
@@ -19,26 +19,25 @@ BASE = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")  # in the ord
 def differences(equations: SymbolicEquations, rng: np.random.Generator, states: int = 3) -> dict[str, float]:
     """Return the largest differences of M, C and N at random letters and states.
 
-    Those of M and N are divided by the largest entry, those of C by max |M| max |v|, because C may be 0. Letters are
-    half to twice their values.
+    Those of M are divided by the largest entry, those of C by max |M| max |v|, those of N by max |N| + max |M| g/m:
+    C and N may be 0. Letters are half to twice their values.
     """
     values = {name: meaning.value * rng.uniform(0.5, 2.0) for name, meaning in equations.letters.items()}
     functions = {name: _function(equations, name, values) for name in "MCN"}
     models = [(1.0, _model(equations, values))]
-    if (
-        equations.lettered == "base"
-    ):  # Pinocchio divides by the mass: add one to each body, and subtract the unit masses
+    if equations.lettered == "base":  # Pinocchio divides by the mass: add one to each body, subtract the unit masses
         models = [(1.0, _model(equations, values, 1.0)), (-1.0, _model(equations, values, 1.0, 0.0))]
+    tree, number = _lettered(equations, values)
     worst = dict.fromkeys("MCN", 0.0)
     for _ in range(states):
         q, v = rng.uniform(-2.0, 2.0, (2, equations.n))
-        both = [(sign, _in_pinocchio(equations, model, q, v)) for sign, model in models]
+        both = [(sign, _in_pinocchio(equations.arm.joint_names, tree, number, model, q, v)) for sign, model in models]
         for name, function in functions.items():
             ours = np.array(function(*q, *v, *values.values()), dtype=float)
             theirs = sum(sign * matrices[name] for sign, matrices in both)
-            scale = max(np.abs(matrices["M" if name == "C" else name]).max() for _, matrices in both)
-            scale *= np.abs(v).max() if name == "C" else 1.0
-            worst[name] = max(worst[name], float(np.abs(ours - theirs).max() / (scale or 1.0)))
+            largest = {key: max(np.abs(matrices[key]).max() for _, matrices in both) for key in "MN"}
+            scale = largest["M"] * {"M": 1.0, "C": np.abs(v).max(), "N": 9.81}[name] + (name == "N") * largest["N"]
+            worst[name] = max(worst[name], float(np.abs(ours - theirs).max() / scale))
     return worst
 
 
@@ -65,25 +64,43 @@ def _function(equations: SymbolicEquations, name: str, values: dict[str, float])
     return sp.lambdify(arguments, getattr(equations, name), cse=True)
 
 
-def _in_pinocchio(equations: SymbolicEquations, model: Any, q: np.ndarray, v: np.ndarray) -> Matrices:
+def _in_pinocchio(
+    names: tuple[str, ...], tree: Tree, number: Callable[[Any], float], model: Any, q: np.ndarray, v: np.ndarray
+) -> Matrices:
+    """Return M, C and N of the coordinates: those of all joints, reduced by q_full = S q + s₀."""
     data = model.createData()
-    order = [model.joints[model.getJointId(name)].idx_v for name in equations.arm.joint_names]
-    full_q, full_v = np.empty(model.nq), np.empty(model.nv)
-    full_q[order], full_v[order] = q, v
+    mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic}
+    S, full_q = np.zeros((model.nv, len(q))), np.empty(model.nq)
+    for joint in map(str, [*model.names][1:]):
+        source, ratio, offset = joint, 1.0, 0.0
+        while source in mimics:
+            offset += ratio * number(mimics[source].offset)
+            ratio *= float(mimics[source].multiplier)
+            source = mimics[source].source
+        row = model.joints[model.getJointId(joint)].idx_v
+        S[row, names.index(source)] = ratio
+        full_q[row] = S[row] @ q + offset
     upper = np.triu(pin.crba(model, data, full_q))
-    M, C = upper + np.triu(upper, 1).T, pin.computeCoriolisMatrix(model, data, full_q, full_v)
+    M, C = upper + np.triu(upper, 1).T, pin.computeCoriolisMatrix(model, data, full_q, S @ v)
     N = pin.computeGeneralizedGravity(model, data, full_q)
-    return {"M": M[np.ix_(order, order)], "C": C[np.ix_(order, order)], "N": N[order][:, None]}
+    return {"M": S.T @ M @ S, "C": S.T @ C @ S, "N": (S.T @ N)[:, None]}
+
+
+def _lettered(equations: SymbolicEquations, values: dict[str, float]) -> tuple[Tree, Callable[[Any], float]]:
+    """Return the lettered tree, and the function that converts its numbers."""
+    arm = equations.arm
+    lettering = Lettering(named=equations.lettered == "file", with_g=equations.lettered is not None)
+    tree = lettering.tree(readable(tree_of(arm.description, arm.edits)), arm.joint_names)
+    every = {name: meaning.value for name, meaning in lettering.letters.items()} | values
+    every |= {name: values[one] for name in every if name[0] == "I" and (one := name.partition("_")[0]) in values}
+    return tree, Numbers(every).number
 
 
 def _model(equations: SymbolicEquations, values: dict[str, float], added: float = 0.0, part: float = 1.0) -> Any:
     """Build a model joint by joint from the lettered tree; base parameters `part` times, and a mass `added` to each."""
     arm, base = equations.arm, equations.lettered == "base"
-    lettering = Lettering(named=equations.lettered == "file", with_g=equations.lettered is not None)
-    tree = lettering.tree(independent(tree_of(arm.description, arm.edits)), arm.joint_names)
-    every = {name: meaning.value for name, meaning in lettering.letters.items()} | values
-    every |= {name: values[one] for name in every if name[0] == "I" and (one := name.partition("_")[0]) in values}
-    number = Numbers(every).number
+    tree, number = _lettered(equations, values)
+    bodies = body_numbers(tree, arm.joint_names)
     model = pin.Model()
     model.gravity = pin.Motion(np.array([*map(number, tree.gravity), 0.0, 0.0, 0.0]))
     frames = {tree.root: (0, pin.SE3.Identity())}
@@ -91,14 +108,14 @@ def _model(equations: SymbolicEquations, values: dict[str, float], added: float 
         parent, at = frames[joint.parent]
         at = at * pin.SE3(_turn(*map(number, joint.rpy)), np.array([*map(number, joint.xyz)], dtype=float))
         axis = np.array([*map(number, joint.axis)]) if joint.kind != "fixed" else np.zeros(3)
-        if joint.name in arm.joint_names:
+        if joint.name in bodies:
             kind = pin.JointModelPrismaticUnaligned if joint.kind == "prismatic" else pin.JointModelRevoluteUnaligned
             parent, at = model.addJoint(parent, kind(axis), at, joint.name), pin.SE3.Identity()
             armature = model.armature
             armature[model.joints[parent].idx_v] = number(joint.armature) * part
             model.armature = armature
             if base:
-                k = arm.joint_names.index(joint.name) + 1
+                k = bodies[joint.name]
                 numbers = part * np.array([values.get(f"{name}{k}", 0.0) for name in BASE])
                 numbers[0] += added
                 model.appendBodyToJoint(parent, pin.Inertia.FromDynamicParameters(numbers), at)

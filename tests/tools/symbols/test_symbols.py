@@ -105,13 +105,13 @@ def test_equations_nobody_reads_are_refused(letters: Any) -> None:
     assert ("--letters base" in str(refused.value)) == (letters == "file")
 
 
-GRIPPER = """<robot name="gripper"><link name="base"/><link name="arm"/><link name="left"/><link name="right"/>
+HAND = """<robot name="hand"><link name="base"/><link name="arm"/><link name="left"/><link name="right"/>
 <joint name="swing" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
 <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
-<joint name="close" type="revolute"><parent link="arm"/><child link="left"/><axis xyz="1 0 0"/><origin xyz="0 0 1"/>
+<joint name="close" type="KIND"><parent link="arm"/><child link="left"/><axis xyz="1 0 0"/><origin xyz="0 0 1"/>
 <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
-<joint name="follow" type="revolute"><parent link="arm"/><child link="right"/><axis xyz="1 0 0"/><origin xyz="0 1 1"/>
-<mimic joint="close" multiplier="-0.5" offset="0.25"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+<joint name="follow" type="KIND"><parent link="PARENT"/><child link="right"/><axis xyz="1 0 0"/><origin xyz="0 1 1"/>
+<mimic joint="close" multiplier="RATIO" offset="0.25"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
 </robot>""".replace(
     '<link name="arm"/><link name="left"/><link name="right"/>',
     "".join(
@@ -122,9 +122,14 @@ GRIPPER = """<robot name="gripper"><link name="base"/><link name="arm"/><link na
 )
 
 
+def hand(kind: str, parent: str, ratio: str) -> rd.Robot:
+    """An arm with a finger and a second one, on the arm or on the finger, that follows the first."""
+    return rd.Robot.from_text(HAND.replace("KIND", kind).replace("PARENT", parent).replace("RATIO", ratio))
+
+
 def test_mimic_joints_are_locked_with_their_drive() -> None:
     """The remedy of the refusal: at 0.7 of the drive, the follower is at −0.5 · 0.7 + 0.25."""
-    arm = rd.Robot.from_text(GRIPPER)
+    arm = hand("revolute", "arm", "-0.5")
     with pytest.raises(QueryError, match=r"lock=\{'close': 0.0\}"):
         symbols(arm)
     locked = symbols(arm.with_(lock={"close": 0.7}))
@@ -132,6 +137,20 @@ def test_mimic_joints_are_locked_with_their_drive() -> None:
     angles = {meaning.value for name, meaning in locked.letters.items() if name.startswith("alpha")}
     assert angles == {0.7, -0.1}
     assert max(differences(locked, np.random.default_rng(4)).values()) < 1e-12
+
+
+@pytest.mark.parametrize("letters", ["file", "base", None])
+@pytest.mark.parametrize(
+    ("kind", "parent", "ratio"),
+    [("revolute", "arm", "-1"), ("revolute", "left", "2"), ("prismatic", "arm", "-1"), ("prismatic", "arm", "0.35")],
+)
+def test_mimic_joints_are_reduced_to_their_drive(kind: str, parent: str, ratio: str, letters: Any) -> None:
+    """q_full = S q + s₀, M = Sᵀ M_full S, …: of Pinocchio's matrices of all joints, at random letters."""
+    reduced = symbols(hand(kind, parent, ratio), letters)
+    assert reduced.n == 2
+    assert rate_is_C_plus_its_transpose(reduced)
+    assert max(reduced.difference.values()) < 1e-14
+    assert max(differences(reduced, np.random.default_rng(5)).values()) < 1e-12
 
 
 def test_the_written_tex_has_one_equation_for_each_entry(tmp_path: Path) -> None:

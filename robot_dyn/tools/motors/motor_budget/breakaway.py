@@ -3,7 +3,7 @@
     τ_b = τ − τ_sliding + f_s sign(v⁺)
 
 τ is the torque of the motion just after, τ_sliding its part against dry friction, f_s the static friction, and v⁺ the
-velocity just after. A motor that does not reach τ_b does not start the joint.
+velocity just after. A motor that does not reach τ_b does not start the joint. The loss of a gear is added.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.effects import SetValued, numbered, torques_by_cause
+from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.motor_budget.cells import Cells
 
 _RESTS = 1e-9  # relative to the largest velocity of a joint: slower is rest
@@ -37,7 +38,7 @@ def static_friction(plant: Plant) -> np.ndarray:
     return np.sum(most, axis=0) if most else np.zeros(n)
 
 
-def breakaway(cells: Cells, plant: Plant) -> Breakaway:
+def breakaway(cells: Cells, plant: Plant, gear: Gear | None = None) -> Breakaway:
     """Return the torques at which joints with static friction leave rest or reverse."""
     friction = static_friction(plant)
     if not friction.any():
@@ -47,9 +48,12 @@ def breakaway(cells: Cells, plant: Plant) -> Breakaway:
     largest = cells.largest_speed
     starts = (np.abs(start) <= _RESTS * largest) & (np.abs(middle) > _RESTS * largest) & (friction > 0)
     cell, joint = np.nonzero(starts)
-    split = torques_by_cause(plant, *cells.states(cell, np.full(len(cell), -1.0)))
+    states = cells.states(cell, np.full(len(cell), -1.0))
+    split = torques_by_cause(plant, *states)
     forces = zip(numbered(*(force.name for force in plant.forces)), plant.forces, strict=True)
     dry = [split.torques[name] for name, force in forces if isinstance(force, SetValued) and force.rubs]
     row = np.arange(len(cell))
-    without = split.tau[row, joint] - np.sum(dry, axis=0)[row, joint]
-    return Breakaway(joint, split.t, without + friction[joint] * np.sign(middle[cell, joint]))
+    tau, direction = split.tau - np.sum(dry, axis=0), np.sign(middle[cell])
+    tau += friction * direction
+    tau += 0.0 if gear is None else gear.loss(tau, direction, states[3])
+    return Breakaway(joint, split.t, tau[row, joint])

@@ -41,8 +41,12 @@ def budget(
     For a plan, τ is computed by inverse dynamics; for a run, it is the recorded actuation. |τ| is compared with the
     peak torque, its root mean square over the motion with the continuous torque. If motors have torque–speed lines, |τ|
     at |v| is compared with the line where they drive (τ v > 0), and the continuous torque is the one at the mean of
-    |v|. Powers are τ v at the joint, without
-    losses of motor and gear. A rotor inertia in `motors` acts as armature if the arm has none. A run that simulates
+    |v|. Powers are τ v at the joint, without losses of the motor. If motors have gear efficiencies, τ is the torque of
+    the motor times the gear ratio, and "gear loss" is one of its causes:
+
+        τ_motor = J a + (τ − J a) η^−s,    s = sign((τ − J a) v),    J the rotor at the joint
+
+    A rotor inertia in `motors` acts as armature if the arm has none. A run that simulates
     gears has its own rotors; those in `motors` must agree to 1 %.
 
     Args:
@@ -131,11 +135,13 @@ def of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, limits:
 
 
 def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) -> MotorBudget:
-    demand, robot = of_run(run), robot_of(run)
+    robot = robot_of(run)
     simulated = _simulated_rotors(run, robot)
     motors = _with_rotors(motors, simulated)
+    limits = limits_of(Plant(robot), motors, **given)
+    demand = of_run(run, limits.gear)
     cut = frozenset(remark.joint for remark in run.remarks if remark.kind == RemarkKind.EFFORT_REACHED)
-    joints = tuple(joint_budgets(demand, limits_of(Plant(robot), motors, **given), cut))
+    joints = tuple(joint_budgets(demand, limits, cut))
     reported = RemarkKind.EFFORT_REACHED, RemarkKind.COARSE
     findings = remark_lines(remark for remark in run.remarks if remark.kind in reported)
     if run.outcome.ending == Ending.STOPPED:
@@ -144,7 +150,9 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     if driven := [name for name in run.effect_torques or {} if name.startswith(_DRIVES)]:
         left.append(f"power at the motors of {', '.join(driven)}, which turn at other speeds than their joints")
     if simulated:
-        findings.append(f"the run simulates the gears of {', '.join(simulated)}, so their rotors come from the run")
+        joined = ", ".join(simulated)
+        findings.append(f"the run simulates the gears of {joined}, so their rotors come from the run")
+        left.append(f"gear losses of {joined}, whose gears the run simulates")
     return _budget(robot, "run of", demand, joints, _sources(motors, given), findings, left, None)
 
 
@@ -165,7 +173,7 @@ def _simulated_rotors(run: Trajectory, robot: Robot) -> dict[str, float]:
 
 
 def _with_rotors(motors: Motors | None, simulated: Mapping[str, float]) -> Motors | None:
-    """Return motors without the rotors that a run simulates.
+    """Return motors without the rotors and gear losses of gears that a run simulates.
 
     Raises:
         PlanError: If the inertia of a motor differs from the one in the run.
@@ -178,7 +186,11 @@ def _with_rotors(motors: Motors | None, simulated: Mapping[str, float]) -> Motor
                 f"{motors.source}: the rotor of {name!r} has {stated:.6g} kg m² at the joint, but the run simulates"
                 f" {simulated[name]:.6g} kg m²; correct the file, or simulate with that inertia"
             )
-    return replace(motors, armature={name: x for name, x in motors.armature.items() if name not in simulated})
+    armature, efficiency = (
+        {name: x for name, x in of_joints.items() if name not in simulated}
+        for of_joints in (motors.armature, motors.efficiency)
+    )
+    return replace(motors, armature=armature, efficiency=efficiency)
 
 
 def _budget(

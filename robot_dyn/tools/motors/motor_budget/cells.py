@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, polynomial
+from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, turning_points
 
 FEWEST = 400  # smallest number of cells of a motion
@@ -74,11 +75,11 @@ class Cells:
         return t, q, v, a
 
 
-def cells(motion: PiecewisePolynomial, plant: Plant) -> Cells:
-    """Return cells that end at the breaks of a motion, where effects switch and, with effects, at reversals."""
+def cells(motion: PiecewisePolynomial, plant: Plant, gear: Gear | None) -> Cells:
+    """Return cells ending at the breaks of a motion, where effects switch and, with effects or gears, reversals."""
     motion = at_rest_exactly(motion)
     inner = [t for effect in plant.effects for t in effect.switches]
-    inner += turning_points(motion).tolist() if plant.forces else []
+    inner += turning_points(motion).tolist() if plant.forces or gear else []
     ends = _ends(motion.breaks, np.array(inner))
     longest = (motion.end_s - motion.start_s) / FEWEST
     parts = np.ceil(np.diff(ends) / longest).astype(int)

@@ -17,6 +17,7 @@ from robot_dyn.control import PiecewisePolynomial, extreme_values
 from robot_dyn.effects import Causes, Stateful, exerted_torques, torques_by_cause
 from robot_dyn.foundations import EffectError, QueryError
 from robot_dyn.simulation import Ending
+from robot_dyn.tools.motors.gear import Gear, with_loss
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.breakaway import NO_BREAKAWAY, Breakaway, breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
@@ -88,7 +89,7 @@ class Demand:
 
 
 def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None = None) -> Demand:
-    """Compute the demand along a plan, with times near the largest used fraction of the torque–speed lines of limits.
+    """Compute the demand along a plan, with the gears of limits, and times near the largest use of their lines.
 
     Raises:
         EffectError: If an effect has states, which a motion does not determine.
@@ -99,11 +100,12 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None =
                 f"budget: {effect.name} has states, which a motion does not determine; simulate the motion, and pass"
                 " the run"
             )
-    grid = cells(motion, plant)
+    gear = limits and limits.gear
+    grid = cells(motion, plant, gear)
     count = len(grid.piece)
     cell, x = np.repeat(np.arange(count), len(X)), np.tile(X, count)
-    tau, v = torques(grid, plant, cell, x)
-    closer = _closer(grid, plant, tau, v, None if limits is None or limits.line is None else limits)
+    tau, v = torques(grid, plant, cell, x, gear)
+    closer = _closer(grid, plant, tau, v, limits)
     cell, x = np.concatenate([cell, closer[0]]), np.concatenate([x, closer[1]])
     rules = [
         np.concatenate([np.outer(grid.length / 2, rule).ravel(), np.zeros(len(closer[0]))]) for rule in (KRONROD, GAUSS)
@@ -111,7 +113,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None =
     order = np.lexsort((x, cell))
     cell, x = cell[order], x[order]
     t, q, v, a = grid.states(cell, x)
-    split = torques_by_cause(plant, t, q, v, a)
+    split = with_loss(torques_by_cause(plant, t, q, v, a), gear, v, a)
     fastest = extreme_values(grid.motion, 1)
     at = np.where(-fastest.least > fastest.greatest, fastest.least_at_s, fastest.greatest_at_s)
     gap = float(grid.length.max() * np.diff(X).max() / 2)
@@ -125,26 +127,29 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None =
         resolution=f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {_PEAKS}"
         " largest of each joint",
         friction=static_friction(plant),
-        starts=breakaway(grid, plant),
+        starts=breakaway(grid, plant, gear),
         cells=grid,
         cell=cell,
         x=x,
     )
 
 
-def torques(cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return torque and velocity at places of cells, both (k, n): the sum of `torques_by_cause` only."""
+def torques(
+    cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray, gear: Gear | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return torque and velocity at places of cells, both (k, n): the sum of `torques_by_cause` and the gear loss."""
     t, q, v, a = cells.states(cell, x)
     acts = plant.forces or plant.equation_of_motion.payloads
     exerted = exerted_torques(plant, t, q, v, a).values() if acts else ()
-    return plant.dynamics.inverse_dynamics(q, v, a) - sum(exerted, start=np.zeros_like(q)), v
+    tau = plant.dynamics.inverse_dynamics(q, v, a) - sum(exerted, start=np.zeros_like(q))
+    return tau if gear is None else tau + gear.loss(tau, v, a), v
 
 
-def root_mean_squares(motion: PiecewisePolynomial, plant: Plant) -> np.ndarray:
-    """Compute √(1/T ∫ τ² dt) of each joint along a motion, (n,), in [N m] or [N]."""
-    grid = cells(motion, plant)
+def root_mean_squares(motion: PiecewisePolynomial, plant: Plant, gear: Gear | None) -> np.ndarray:
+    """Compute √(1/T ∫ τ² dt) of each motor along a motion, (n,), in [N m] or [N]."""
+    grid = cells(motion, plant, gear)
     count = len(grid.piece)
-    tau, _ = torques(grid, plant, np.repeat(np.arange(count), len(X)), np.tile(X, count))
+    tau, _ = torques(grid, plant, np.repeat(np.arange(count), len(X)), np.tile(X, count), gear)
     weights = np.outer(grid.length / 2, KRONROD).ravel()
     return np.sqrt(weights @ tau**2 / weights.sum())
 
@@ -155,7 +160,7 @@ def _closer(
     """Return cells and places of the largest |τ|, |τ v| and used fraction of limits of each joint, refined."""
 
     def sizes(tau: np.ndarray, v: np.ndarray) -> np.ndarray:
-        used = () if limits is None else (limits.used(tau, v),)
+        used = () if limits is None or limits.line is None else (limits.used(tau, v),)
         return np.concatenate([np.abs(tau), np.abs(tau * v), *used], axis=1)
 
     y = sizes(tau, v).reshape(len(cells.piece), len(X), -1)
@@ -168,7 +173,7 @@ def _closer(
     best = X[node]
     for _ in range(_ROUNDS):
         x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _POINTS)
-        torque, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel())
+        torque, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel(), limits and limits.gear)
         all_of = sizes(torque, speed).reshape(len(cell), _POINTS, -1)
         k = all_of[np.arange(len(cell)), :, column].argmax(axis=1)
         row = np.arange(len(cell))
@@ -176,8 +181,8 @@ def _closer(
     return cell, best
 
 
-def of_run(run: Trajectory) -> Demand:
-    """Compute the demand at the samples of a run, with extremes over all steps.
+def of_run(run: Trajectory, gear: Gear | None) -> Demand:
+    """Compute the demand at the samples of a run, with extremes over all steps; of torques only without gear losses.
 
     Raises:
         QueryError: If the run diverged, has one sample, or does not contain the torques of its effects.
@@ -186,7 +191,7 @@ def of_run(run: Trajectory) -> Demand:
         raise QueryError(f"the run diverged at {run.outcome.t:.6g} s, so its torques are meaningless; correct the run")
     if len(run.t) < 2:
         raise QueryError("the run has one sample: record more samples")
-    split = run.causes()
+    split = with_loss(run.causes(), gear, run.v, run.a)
     weights = _trapezoidal(run.t, np.arange(len(run.t)))
     every_other = np.unique(np.append(np.arange(0, len(run.t), 2), len(run.t) - 1))
     row, column = np.abs(run.v).argmax(axis=0), np.arange(run.v.shape[1])
@@ -194,8 +199,9 @@ def of_run(run: Trajectory) -> Demand:
     resolution = f"at {len(run.t)} samples, at most {np.diff(run.t).max():.2g} s apart"
     if run.extremes is not None:
         largest = np.abs(run.extremes).max(axis=1)
-        peak, speed = (np.fmax(x, y) for x, y in ((peak, largest[2]), (speed, largest[1])))
-        resolution += "; peaks of torque and speed are over all steps"
+        speed = np.fmax(speed, largest[1])
+        peak = np.fmax(peak, largest[2]) if gear is None else peak
+        resolution += f"; peaks of {'torque and ' if gear is None else ''}speed are over all steps"
     coarse = _trapezoidal(run.t, every_other)
     return Demand(split, run.v, weights, coarse, peak, (speed, run.t[row]), resolution, np.full(len(peak), np.nan))
 

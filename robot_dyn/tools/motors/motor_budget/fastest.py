@@ -104,7 +104,7 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, fraction)
     mean = of_motion(plan.reference, plant).mean_speed  # at a slower pace, more continuous torque is allowed
     continuous = limits.at_mean_speed(mean).continuous
-    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, continuous)
+    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, continuous, limits.gear)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)

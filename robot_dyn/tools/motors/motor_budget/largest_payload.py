@@ -28,6 +28,7 @@ from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 
 _ROUNDS = 12
+_INSTEAD = "compute budgets with payload= instead"
 _CLOSE = 1e-9  # relative to a limit, by which a peak between the times may exceed it
 _AFFINE = 1e-9  # relative to the torque, its largest deviation from an affine function
 _NONE = 1e-12  # relative to the largest torque of a unit mass: smaller torques are rounding
@@ -107,6 +108,8 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     """
     plant, motion, limits = case_of(motor_budget, "the largest payload")
     robot: Any = plant.dynamics
+    if limits.gear is not None:
+        raise QueryError("the torque of motors with gear losses is not affine in the mass of the payload; " + _INSTEAD)
     unit, bare = Payload(link, 1.0, com), of_motion(motion, plant, limits)
     limits = limits.at_mean_speed(bare.mean_speed)
     carried = float(sum(payload.mass for payload in robot.edits.payloads))
@@ -152,8 +155,8 @@ def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: 
     size = np.abs(bare).max() + mass * np.abs(per_mass).max()
     if np.abs(bare + mass * per_mass - there.split.tau).max() > _AFFINE * size:
         raise QueryError(
-            "the torque is not affine in the mass of the payload: an effect depends on the dynamics of the arm; compute"
-            " budgets with payload= instead"
+            "the torque is not affine in the mass of the payload: an effect depends on the dynamics of the arm; "
+            + _INSTEAD
         )
     m, n = bare.shape
     joints, t = np.tile(np.arange(n), m), np.repeat(there.split.t, n)

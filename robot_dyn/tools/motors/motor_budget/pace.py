@@ -7,7 +7,7 @@ A motion that takes λ times as long has velocities u q̇ and accelerations u² 
 is a polynomial of degree 4 if effects are polynomials of degree 2 in the velocity. It need not decrease with λ, because
 inertia may relieve gravity. The u that satisfy a limit form intervals between roots of ⟨τ²⟩(u) = τ_continuous²; the
 u that satisfy all limits form their intersection. The function is interpolated in each octave of u at five Chebyshev
-points, exactly for such effects; for other effects, a result is checked against the torque itself.
+points, exactly for such effects; for others, and gear losses, a result is checked against the torque itself.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.polynomial import chebyshev
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.motor_budget.demand import root_mean_squares
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 
@@ -41,11 +42,11 @@ class Pace(NamedTuple):
         return self.fraction <= 1 + TOLERANCE
 
 
-def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray) -> Pace:
+def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray, gear: Gear | None = None) -> Pace:
     """Return the smallest λ from 1 to 128 that meets the continuous limits, (n,); else the λ of the smallest share."""
 
     def at(factor: float) -> Pace:
-        shares = root_mean_squares(at_pace(motion, factor), plant) / continuous
+        shares = root_mean_squares(at_pace(motion, factor), plant, gear) / continuous
         return Pace(float(factor), float(shares.max()), int(shares.argmax()))
 
     best = at(1.0)
@@ -53,7 +54,7 @@ def least_pace(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray
         return best
     for octave in range(_OCTAVES):
         u = 2.0 ** -(octave + 1) * np.array([1.0, 2.0])
-        table = _squares(motion, plant, continuous, u)
+        table = _squares(motion, plant, continuous, u, gear)
         for x in (x for x in _ends(table) if chebyshev.chebval(x, table).max() <= 1 + _ROUNDING):
             if (pace := at(1 / _place(u, x))).fits:
                 return pace
@@ -69,12 +70,14 @@ def at_pace(motion: PiecewisePolynomial, factor: float) -> PiecewisePolynomial:
     return PiecewisePolynomial(motion.breaks * factor, motion.coefficients * powers[:, None])
 
 
-def _squares(motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _squares(
+    motion: PiecewisePolynomial, plant: Plant, continuous: np.ndarray, u: np.ndarray, gear: Gear | None
+) -> np.ndarray:
     """Return Chebyshev coefficients of ⟨τ²⟩/τ_continuous² over an interval of u, (5, k), for joints with a limit."""
     limited = np.isfinite(continuous)
 
     def squares(x: np.ndarray) -> Any:
-        rms = np.array([root_mean_squares(at_pace(motion, 1 / place), plant) for place in _place(u, x)])
+        rms = np.array([root_mean_squares(at_pace(motion, 1 / place), plant, gear) for place in _place(u, x)])
         return (rms / continuous)[:, limited] ** 2
 
     return chebyshev.chebinterpolate(squares, _DEGREE)

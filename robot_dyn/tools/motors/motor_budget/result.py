@@ -12,6 +12,7 @@ from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, instance, number_or_dash, reported
 from robot_dyn.queries import of_joint, without_rounding
 from robot_dyn.report import Result
+from robot_dyn.tools.motors.gear import LOSS
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
@@ -105,7 +106,8 @@ class MotorBudget(Result):
         }
         yield _table(needs)
         yield ""
-        yield "at the joint, without losses of motor and gear:"
+        has_loss = any(LOSS in x.of_peak for x in joints)
+        yield f"at the joint, without losses of {'the motor' if has_loss else 'motor and gear'}:"
         speed |= {
             "speed": [x.speed for x in joints],
             "at t [s]": [x.speed_at_s for x in joints],

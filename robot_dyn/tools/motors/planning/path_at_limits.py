@@ -57,6 +57,7 @@ def path(
     τ is the plant's inverse dynamics, with all effects. The motion is a polynomial in each of a few hundred pieces, in
     which s̈ is constant: acceleration and torque jump between pieces, as in all time-optimal motions. The limits are
     checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass fraction=0.95.
+    With gears of efficiency η, the limit is η τ_max, also for braking; the torque of the motors is checked.
 
     Args:
         plant: A plant or an arm.
@@ -91,7 +92,7 @@ def planned(plant: Plant, limits: Limits, points: JointValues | PiecewisePolynom
     geometry = geometric_path(points, plant.dynamics.joint_names)
     check_effects(plant)
     check_positions(plant, geometry)
-    check_limited(plant, limits, geometry)
+    check_limited(plant, limits.through_gear(), geometry)
     names = plant.dynamics.joint_names
     motion, use = _within(plant, limits, geometry)
     largest, at_limits = float(use.largest.max()), float((use.largest >= BINDS).mean())
@@ -120,7 +121,7 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
     """Return the fastest motion within limits, and its use of the limits."""
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
-        motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
+        motion, error = _fastest_motion(plant, limits.through_gear().times(allowed, allowed), path)
         use = limit_use(plant, limits, motion, checked_times(motion.end_s))
         largest = float(use.largest.max())
         if largest <= _REFUSED and (error <= _ERROR or limits.line is not None):

@@ -119,6 +119,7 @@ def limit_use(plant: Plant, limits: Limits, motion: PiecewisePolynomial, t: np.n
     """Compute the shares of a plant's limits that a motion uses, by inverse dynamics."""
     q, v, a = motion.at(t)
     tau = plant.inverse_dynamics(q, v, a, t=0.0)
+    tau += 0.0 if limits.gear is None else limits.gear.loss(tau, v, a)
     torque = tau / limits.effort if limits.line is None else np.copysign(limits.used(tau, v), tau)
     return LimitUse(t, (torque, v / limits.velocity, a / limits.acceleration))
 
