@@ -3,8 +3,8 @@
     τ = Y_k(q, v, a) π + v b + sign(v) c + τ₀ − δ dτ/dt + e
     θ = (Zᵀ W Y)⁻¹ Zᵀ W τ,   cov θ = (Zᵀ W Y)⁻¹ Zᵀ W S W Z (Zᵀ W Y)⁻ᵀ
 
-Z is the same regressor on a motion that is independent of the noise of the log: least squares are biased, because noise
-of q enters Y and, through the controller, τ. S is the autocovariance of the residuals between all joints.
+Z is the same regressor on a motion that nearly lacks the noise of the log: least squares are biased, because noise of q
+enters Y and, through the controller, τ. S is the autocovariance of the residuals between all joints.
 Sums of it are corrected for the part of the errors that the fit takes.
 [Young 2011; Janot, Vandanjon, Gautier 2014; Newey, West 1987]
 """
