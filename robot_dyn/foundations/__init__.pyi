@@ -67,6 +67,8 @@ from robot_dyn.foundations.files import why as why
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError as NotPositiveDefiniteError
 from robot_dyn.foundations.linear_algebra import cholesky_solve as cholesky_solve
 from robot_dyn.foundations.linear_algebra import eigh as eigh
+from robot_dyn.foundations.local_ascent import largest_found as largest_found
+from robot_dyn.foundations.local_ascent import search_box as search_box
 from robot_dyn.foundations.public import public_names as public_names
 from robot_dyn.foundations.result import UNREPORTED as UNREPORTED
 from robot_dyn.foundations.result import json_text as json_text

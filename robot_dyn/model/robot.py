@@ -48,6 +48,7 @@ from robot_dyn.foundations.errors import (
     RobotDynError,
     announce,
 )
+from robot_dyn.foundations.local_ascent import search_box
 from robot_dyn.foundations.validate import JointValues, function, instance, is_moderate, is_plain, is_state, numbers
 from robot_dyn.foundations.values import Caching, OnFirstUse
 from robot_dyn.model.calls import Scratch
@@ -378,11 +379,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             QueryError: If rng is not a numpy.random.Generator.
         """
         instance("rng", rng, np.random.Generator, "give a generator, for example numpy.random.default_rng(0)")
-        slides = np.array([kind == "prismatic" for kind in self.joint_types])
-        half = (self.upper - self.lower) / 2
-        half = np.where(np.isfinite(half) & slides, half, np.minimum(half, np.where(slides, 1.0, np.pi)))
-        middle = np.clip(0.0, self.lower + half, self.upper - half)
-        return rng.uniform(np.maximum(self.lower, middle - half), np.minimum(self.upper, middle + half))
+        return rng.uniform(*search_box(self.lower, self.upper, self.joint_types))
 
     @staticmethod
     def from_text(urdf: str | bytes, *, source: str = "the text of the URDF") -> Robot:

@@ -7,18 +7,17 @@ A search proves no bound: the largest difference found is a lower bound of the l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
 
 from robot_dyn import Robot
+from robot_dyn.foundations import largest_found, search_box
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.doctor.coordinate_map import JointMap
 
-_STEP = 1e-5  # [rad] or [m] of central differences
-_STARTS = 3  # states from which each local ascent starts
 _ROUNDING = 1e-12  # of the largest entry of N or M: smaller differences are rounding
 
 
@@ -130,37 +129,15 @@ def largest_differences(
         value_a, value_b = query(states)
         difference, rounding = value_b - value_a, _ROUNDING * np.abs(value_a).max()
         for j in range(n):
-            row = np.abs(difference[:, j])
-            k = () if quantity == "N" else (int(np.argmax(row.max(axis=0))),)
+            k = () if quantity == "N" else (int(np.argmax(np.abs(difference[:, j]).max(axis=0))),)
             at = (j, *k)
-            starts = states[np.argsort(-row[(slice(None), *k)], kind="stable")[:_STARTS]]
-            q = _ascended(
-                lambda q, at=at, query=query: np.subtract(*(x[(slice(None), *at)] for x in query(q))), starts, low, high
-            )
+            q = largest_found(
+                lambda q, at=at, query=query: np.subtract(*(x[(slice(None), *at)] for x in query(q))),
+                states, difference[(slice(None), *at)], low, high,
+            )  # fmt: skip
             first, second = (float(x[at]) for x in query(q))
             second = first if abs(second - first) <= rounding else second
             yield _reported(pair, links, quantity, at, q, first, second)
-
-
-def _ascended(
-    f: Callable[[np.ndarray], np.ndarray], starts: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """Return the state of largest |f| among the ends of local ascents, and their starts; f takes states (m, n)."""
-    from scipy.optimize import minimize
-
-    steps = _STEP * np.concatenate([np.zeros((1, starts.shape[1])), np.eye(starts.shape[1]), -np.eye(starts.shape[1])])
-    states = [*starts]
-    for start, value in zip(starts, f(starts), strict=True):
-
-        def descent(q: np.ndarray, value: float = value) -> tuple[float, np.ndarray]:
-            """Return −f and its gradient by central differences, relative to f at the start."""
-            y, up, down = np.split(-f(q + steps) / value, [1, 1 + len(q)])
-            return float(y[0]), (up - down) / (2 * _STEP)
-
-        if value != 0:
-            end = minimize(descent, start, jac=True, method="L-BFGS-B", bounds=[*zip(low, high, strict=True)])
-            states.append(np.clip(end.x, low, high))
-    return states[int(np.argmax(np.abs(f(np.array(states)))))]
 
 
 def _box(pair: MappedPair) -> tuple[np.ndarray, np.ndarray]:
@@ -171,11 +148,7 @@ def _box(pair: MappedPair) -> tuple[np.ndarray, np.ndarray]:
     low_b, high_b = pair.limits_of_b()
     low, high = np.maximum(pair.a.lower, low_b), np.minimum(pair.a.upper, high_b)
     low, high = np.where(low < high, (low, high), (pair.a.lower, pair.a.upper))
-    slides = np.array([kind == "prismatic" for kind in pair.a.joint_types])
-    half = (high - low) / 2
-    half = np.where(np.isfinite(half) & slides, half, np.minimum(half, np.where(slides, 1.0, np.pi)))
-    middle = np.clip(0.0, low + half, high - half)
-    return np.maximum(low, middle - half), np.minimum(high, middle + half)
+    return search_box(low, high, pair.a.joint_types)
 
 
 def _reported(

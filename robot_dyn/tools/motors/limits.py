@@ -39,6 +39,7 @@ class Limits:
         continuous: Root mean square of τ, in [N m] or [N].
         line: Peak torque of driving motors by speed; None for none.
         continuous_line: Continuous torque by the mean speed of a motion; None for none.
+        brake: Holding torque of brakes by joint, in [N m] or [N].
         gear: Gears with losses, so that torque limits are those of motors; None for none.
     """
 
@@ -48,6 +49,7 @@ class Limits:
     continuous: Any = field(default=inf, metadata=_positive("N m"))
     line: TorqueSpeed | None = None
     continuous_line: TorqueSpeed | None = None
+    brake: Mapping[str, float] = field(default_factory=dict)
     gear: Gear | None = None
 
     def __post_init__(self) -> None:
@@ -119,6 +121,7 @@ def limits_of(
     if motors is not None:
         limits = replace(
             limits,
+            brake={name: x for name, x in motors.brake.items() if name in robot.joint_names},
             gear=_gear(motors, robot),
             line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
             continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),

@@ -6,7 +6,7 @@
 Torques and speeds are at the joint, or at the motor shaft if the column `at` is "motor": the gear ratio then multiplies
 the torque and divides the speed. A rotor adds the inertia ratio² · rotor_inertia at the joint. A joint with several
 lines has a motor whose torques fall with speed: each line is a corner of its torque–speed line, see `Motors.line`.
-A column `efficiency` states the losses of gears, for torques at the motor.
+A column `efficiency` states the losses of gears, for torques at the motor, and `brake` the holding torque of a brake.
 [Siciliano et al. 2009, sec. 5.2]
 """
 
@@ -36,6 +36,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "at": {"": 1.0},
     "peak": _TORQUE,
     "continuous": _TORQUE,
+    "brake": _TORQUE,
     "speed": _SPEED,
     "gear_ratio": {"": 1.0},
     "rotor_inertia": _INERTIA,
@@ -62,6 +63,7 @@ class Motors:
         continuous_line: Continuous torque by mean speed.
         efficiency: η of the gear, above 0 and at most 1: driving motors supply 1/η of the torque through the gear, and
             motors that are driven back supply η of it. Joints without a value have gears without losses.
+        brake: Holding torque of a brake, in [N m] or [N]; joints without a value have no brake.
     """
 
     peak: Mapping[str, float]
@@ -72,6 +74,7 @@ class Motors:
     line: Mapping[str, Points] = field(default_factory=dict)
     continuous_line: Mapping[str, Points] = field(default_factory=dict)
     efficiency: Mapping[str, float] = field(default_factory=dict)
+    brake: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def limit(self) -> TorqueSpeedLimit:
@@ -95,14 +98,15 @@ class Motors:
 def read_motors(path: str | Path) -> Motors:
     """Read the motors of a CSV file; the first line names the columns, with units in brackets.
 
-    Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], efficiency, at. All
-    except `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and [m/s]; speeds may be
-    in [rpm] or [deg/s], efficiencies in [%]. `at` is "joint" or "motor", the place of torques and speeds; it is
-    required with gear ratios. An efficiency needs torques at the motor: those at the joint contain the loss.
+    Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], efficiency,
+    brake [N m], at. All except `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and
+    [m/s]; speeds may be in [rpm] or [deg/s], efficiencies in [%]. `at` is "joint" or "motor", the place of torques and
+    speeds; it is required with gear ratios. An efficiency needs torques at the motor: those at the joint contain the
+    loss.
 
     Several lines of one joint are the corners of its torque–speed line, with increasing speeds and peaks that do not
-    increase; those with a continuous torque are the corners of a second line. The first states at, gear, rotor and
-    efficiency.
+    increase; those with a continuous torque are the corners of a second line. The first states at, gear, rotor,
+    efficiency and brake.
 
     Raises:
         PlanError: If the file cannot be read, a column or unit is unknown, an entry is not a positive number, corners
@@ -120,7 +124,7 @@ def read_motors(path: str | Path) -> Motors:
     rows = [_motor(joint) for joint in corners.values()]
     columns = {
         key: {row["joint"]: row[key] for row in rows if row.get(key)}
-        for key in ("peak", "continuous", "speed", "armature", "line", "continuous_line", "efficiency")
+        for key in ("peak", "continuous", "speed", "armature", "line", "continuous_line", "efficiency", "brake")
     }
     return Motors(**columns, source=str(path))
 
@@ -159,7 +163,7 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         if other := next(
             (
                 x
-                for x in ("at", "gear_ratio", "rotor_inertia", "efficiency")
+                for x in ("at", "gear_ratio", "rotor_inertia", "efficiency", "brake")
                 if row.get(x, "") not in ("", first.get(x))
             ),
             "",
@@ -188,7 +192,7 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         if at == "joint" and "speed" in row:
             check_speed(f"{row['where']}: speed", row["speed"], PlanError)
     N = ratio if at == "motor" else 1.0
-    motor = {name: N * first[name] for name in ("peak", "continuous") if name in first}
+    motor = {name: N * first[name] for name in ("peak", "continuous", "brake") if name in first}
     motor |= {"joint": joint, "armature": ratio**2 * first.get("rotor_inertia", 0.0)}
     motor |= {"efficiency": efficiency} if efficiency < 1 else {}
     if "speed" in first:

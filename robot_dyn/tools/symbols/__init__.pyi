@@ -7,6 +7,7 @@ from robot_dyn.tools.symbols.letters import RoundedAngle as RoundedAngle
 __all__: list[str]
 
 # Names that tests import of this folder.
+from robot_dyn.tools.symbols.latex import align as align
 from robot_dyn.tools.symbols.letters import Lettering as Lettering
 from robot_dyn.tools.symbols.letters import body_numbers as body_numbers
 from robot_dyn.tools.symbols.letters import readable as readable

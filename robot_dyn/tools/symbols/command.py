@@ -13,6 +13,7 @@ def derive(
     /,
     output: str | None = None,
     letters: str = "file",
+    matrices: str = "MCN",
     force: Force = False,
     options: RobotOptions = AS_STATED,
 ) -> None:
@@ -23,17 +24,19 @@ def derive(
     Options:
         output (FILE.tex): LaTeX file to input into a document that uses amsmath.
         letters (file|base|none): A letter for each number of the file, for each base parameter, or none.
+        matrices (LETTERS): Matrices to print, for example N for gravity only.
     """
     kinds = {"file": "file", "base": "base", "none": None}
     if letters not in kinds:
         raise QueryError(f"--letters must be file, base or none, got {letters}")
     path = None if output is None else target(output, FileKind("LaTeX", ".tex"), ExportError, force=force)
     equations = rd.tools.symbols.symbols(options.load(robot), kinds[letters])  # pyright: ignore[reportArgumentType]
-    latex = equations.latex()
+    latex = equations.latex(matrices)
     if path is None:
         show([*str(equations).splitlines(), *latex.splitlines()], as_json=False)
         return
     comments = "".join(f"% {line}\n" for line in str(equations).splitlines())
-    save(path, lambda stream: stream.write((comments + latex).encode()), ExportError)
+    pages = f"\\begingroup\\allowdisplaybreaks\n{latex}\\endgroup\n"
+    save(path, lambda stream: stream.write((comments + pages).encode()), ExportError)
     show(str(equations).splitlines(), as_json=False)
     to_stderr(f"written: {path}")

@@ -14,6 +14,7 @@ from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.foundations import QueryError, first_moment, needs, shown
 from robot_dyn.lagrange import FORMULAS, Linkage, Pose, linkage_of, tree_of
 from robot_dyn.tools.symbols.fourier import expression, shortest
+from robot_dyn.tools.symbols.latex import align
 from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle, body_numbers, readable
 from robot_dyn.tools.symbols.polynomials import Letter, Numbers, Polynomials, Turn
 
@@ -97,27 +98,28 @@ class SymbolicEquations:
             result[name] = float(np.abs(ours - exact).max() / (np.abs(exact).max() or 1.0))
         return result
 
-    def latex(self) -> str:
-        """Return the equations in LaTeX, one line an entry, in an align* environment of amsmath.
+    def latex(self, matrices: str = "MCN") -> str:
+        """Return the equations in LaTeX, in an align* environment of amsmath with lines for a page of one column.
 
         M is symmetric: its upper triangle is printed. Entries that are not printed are zero.
 
-        Raises:
-            QueryError: If the equations are too long to read.
-        """
-        import sympy as sp
+        Args:
+            matrices: Letters of the matrices to print, for example "N" for gravity only.
 
-        if self.terms["M"] + self.terms["N"] > READABLE:
+        Raises:
+            QueryError: If the equations are too long to read, or a letter is not M, C or N.
+        """
+        if not isinstance(matrices, str) or not matrices or {*matrices} - {*"MCN"}:
+            raise QueryError(f"matrices must be letters of 'MCN', for example 'MN', got {shown(matrices)}")
+        if sum(self.terms[name] for name in "MN" if name in matrices) > READABLE:
             raise _unreadable(f"M has {self.terms['M']} terms, N {self.terms['N']}", self.lettered)
-        names = {sp.Symbol(f"v{k + 1}", real=True): rf"\dot{{q}}_{{{k + 1}}}" for k in range(self.n)}
-        lines = []
-        for name, matrix in (("M", self.M), ("C", self.C), ("N", self.N)):
-            for i in range(self.n):
-                for j in range(i if name == "M" else 0, matrix.cols):
-                    if matrix[i, j] != 0:
-                        index = i + 1 if name == "N" else f"{i + 1}{j + 1}"
-                        lines.append(f"{name}_{{{index}}} &= {sp.latex(matrix[i, j], symbol_names=names)}")
-        return "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}\n"
+        places = [(i, j) for i in range(self.n) for j in range(self.n)]
+        entries = {
+            "M": [(f"M_{{{i + 1}{j + 1}}}", self.M[i, j]) for i, j in places if i <= j],
+            "C": [(f"C_{{{i + 1}{j + 1}}}", self.C[i, j]) for i, j in places],
+            "N": [(f"N_{{{i + 1}}}", self.N[i]) for i in range(self.n)],
+        }
+        return align((left, right) for name in matrices for left, right in entries[name] if right != 0)
 
     def _repr_latex_(self) -> str:
         return self.latex() if self.terms["M"] + self.terms["N"] <= READABLE else str(self)

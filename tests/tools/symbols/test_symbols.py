@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
+import shutil
+import subprocess
 import sys
 import warnings
 from importlib import import_module
@@ -15,7 +18,7 @@ import sympy as sp
 
 import robot_dyn as rd
 from robot_dyn.foundations import MissingExtraError, QueryError, RobotDynWarning
-from robot_dyn.tools.symbols import SymbolicEquations, symbols
+from robot_dyn.tools.symbols import SymbolicEquations, align, symbols
 from tests.command import run
 from tests.tools.symbols.in_pinocchio import differences, rate_is_C_plus_its_transpose
 
@@ -159,7 +162,7 @@ def test_the_written_tex_has_one_equation_for_each_entry(tmp_path: Path) -> None
     import_module("robot_dyn.tools.symbols.command")  # registers it, also where an older version is installed
     done = run("derive", "planar_2r", "-o", path)
     assert done.returncode == 0, done.stderr
-    lines = [line for line in path.read_text().splitlines() if not line.startswith("%")]
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("%")][1:-1]  # in a group
     assert (lines[0], lines[-1]) == (r"\begin{align*}", r"\end{align*}")
     assert [line.split(" &= ")[0] for line in lines[1:-1]] == [
         f"{name}_{{{place}}}" for name, places in (("M", "11 12 22"), ("C", "11 12 21"), ("N", "1 2"))
@@ -170,6 +173,46 @@ def test_the_written_tex_has_one_equation_for_each_entry(tmp_path: Path) -> None
         depths = np.cumsum([(x == "{") - (x == "}") for x in line])
         assert depths.min() == 0 == depths[-1]
         assert line.count(r"\left(") == line.count(r"\right)")
+
+
+def test_sums_are_broken_before_a_term_and_long_products_multiplied_out() -> None:
+    """A (x₁ + … + x₃₀) has 30 terms, each printed once."""
+    a, *x = sp.symbols("a x1:31", real=True)
+    first, *others = align([("y", a * sp.Add(*x))]).splitlines()[1:-1]
+    assert first.startswith("y &= a x_{1} +") and others and all(line.startswith(r"&\quad + a x_") for line in others)
+    printed = re.findall(r"a x_\{(\d+)\}", " ".join([first, *others]))
+    assert sorted(map(int, printed)) == [*range(1, 31)]
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex (Debian: texlive-latex-base)")
+@pytest.mark.parametrize(
+    ("arm", "letters"),
+    [
+        ("planar_2r", "file"),
+        ("cart_pole", "file"),
+        (str(OWN), "file"),
+        pytest.param("ur5", "base", marks=pytest.mark.long),
+    ],
+)
+def test_printed_lines_fit_a_page(arm: str, letters: Any, tmp_path: Path) -> None:
+    """TeX reports each line that is wider than the column, and each page that is too high."""
+    page = symbols(loaded(arm), letters).latex()
+    head = r"\documentclass{article}\usepackage{amsmath}\allowdisplaybreaks\begin{document}"
+    (tmp_path / "page.tex").write_text(head + page + r"\end{document}")
+    done = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "page.tex"], cwd=tmp_path, capture_output=True, timeout=60, check=False
+    )
+    assert done.returncode == 0 and b"Overfull" not in done.stdout
+
+
+def test_latex_of_some_matrices() -> None:
+    equations = symbols(rd.load("planar_2r"))
+    M, C, N = (equations.latex(name).splitlines()[1:-1] for name in "MCN")
+    assert len([*M, *C, *N]) == len(equations.latex().splitlines()) - 2
+    assert all(line.startswith("N_") for line in N)
+    for wrong in ("", "MK", None):
+        with pytest.raises(QueryError):
+            equations.latex(wrong)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(("arm", "letters"), [("mimic_chain", "file"), ("planar_2r", "all"), (None, "file")])

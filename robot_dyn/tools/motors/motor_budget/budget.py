@@ -16,6 +16,7 @@ from robot_dyn.report import processor_and_versions
 from robot_dyn.simulation import Ending, RemarkKind, remark_lines, robot_of
 from robot_dyn.tools.motors.limits import Limits, check_motors, limits_of, outside_positions, same_rotor
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
+from robot_dyn.tools.motors.motor_budget.holding import holdings
 from robot_dyn.tools.motors.motor_budget.joint_budget import JointBudget, joint_budgets
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 from robot_dyn.tools.motors.motors_file import Motors
@@ -129,7 +130,8 @@ def of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, limits:
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):
         findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(
-        robot, "motion" if plan is None else plan.method, demand, tuple(joint_budgets(demand, limits)),
+        robot, "motion" if plan is None else plan.method, demand,
+        tuple(joint_budgets(demand, limits, holdings(robot, limits.brake))),
         sources, findings, [], (plant, reference, limits),
     )  # fmt: skip
 
@@ -141,7 +143,7 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     limits = limits_of(Plant(robot), motors, **given)
     demand = of_run(run, limits.gear)
     cut = frozenset(remark.joint for remark in run.remarks if remark.kind == RemarkKind.EFFORT_REACHED)
-    joints = tuple(joint_budgets(demand, limits, cut))
+    joints = tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), cut))
     reported = RemarkKind.EFFORT_REACHED, RemarkKind.COARSE
     findings = remark_lines(remark for remark in run.remarks if remark.kind in reported)
     if run.outcome.ending == Ending.STOPPED:

@@ -21,7 +21,13 @@ _WIDE, _ROW, _CELL, _AROUND = 13.0, 0.42, 2.3, 1.9  # [inch]
 _ACROSS, _MOST = 3, 64  # joints in a row; joints of a figure
 _LETTERS = 24  # in the name of a joint next to its bars
 _BAR = 0.27
-_SHADES = {"peak": 1.0, "continuous": 0.72, "speed": 0.46, "line": 0.3}  # shades of ink for bars; colours mark causes
+_SHADES = {
+    "peak": 1.0,
+    "continuous": 0.72,
+    "speed": 0.46,
+    "line": 0.3,
+    "brake": 0.18,
+}  # shades of ink for bars; colours mark causes
 
 
 def draw(result: MotorBudget, theme: str = "light") -> Figure:

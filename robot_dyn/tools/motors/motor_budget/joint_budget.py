@@ -14,11 +14,13 @@ from robot_dyn.foundations import reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits, used_fraction
 from robot_dyn.tools.motors.motor_budget.demand import Demand
+from robot_dyn.tools.motors.motor_budget.holding import Holding
 
 TOLERANCE = 1e-3  # relative to a limit, by which plans at their limits may exceed it
 _DIGITS = 12  # decimals of times in [s]: places at the ends of cells lie slightly inside
 KINDS: Mapping[str, str] = {
-    "peak": "peak torque", "continuous": "continuous torque", "speed": "speed", "line": "torque–speed line"
+    "peak": "peak torque", "continuous": "continuous torque", "speed": "speed", "line": "torque–speed line",
+    "brake": "brake",
 }  # fmt: skip
 
 
@@ -44,6 +46,7 @@ class JointBudget:
         of_rms: Parts of `rms` by cause, 1/(T rms) ∫ τ_cause τ dt; negative for a cause that relieves the motor.
         line: Largest use of the torque–speed line: "torque" in [N m], "speed" in [rad/s], "limit" at that speed,
             "used", the fraction, and "at_s" in [s]; empty without a line.
+        holding: The brake, and the torque of gravity that it holds; None without a brake.
         cut: True if an effort limit cut the actuation of a run, so that the demand was higher.
     """
 
@@ -68,16 +71,18 @@ class JointBudget:
     of_peak: dict[str, float]
     of_rms: dict[str, float]
     line: dict[str, float] = field(default_factory=dict)
+    holding: Holding | None = None
     cut: bool = False
 
     @property
     def shares(self) -> dict[str, float]:
-        """Used fractions of the limits "peak", "continuous" and "speed", and of a "line"; 0 for unknown limits."""
+        """Used fractions of the limits "peak", "continuous" and "speed", of a "line" and a "brake"; 0 if unknown."""
         peak = max(self.peak, 0.0 if isnan(self.breakaway) else self.breakaway)
         demand = np.array([peak, self.rms, self.speed])
         limit = np.array([self.peak_limit, self.continuous_limit, self.speed_limit])
         used = dict(zip(KINDS, used_fraction(demand, limit).tolist(), strict=False))
-        return used | ({"line": self.line["used"]} if self.line else {})
+        used |= {"line": self.line["used"]} if self.line else {}
+        return used | ({"brake": self.holding.gravity / self.holding.brake} if self.holding else {})
 
     @reported
     def headroom(self) -> dict[str, float]:
@@ -86,7 +91,7 @@ class JointBudget:
 
     @reported
     def too_small(self) -> tuple[str, ...]:
-        """Limits that are exceeded by more than a thousandth: "peak", "continuous" or "speed".
+        """Limits that are exceeded by more than a thousandth: "peak", "continuous", "speed", "line" or "brake".
 
         A peak torque at which the actuation was cut is included.
         """
@@ -104,13 +109,17 @@ class JointBudget:
             speed = f"{self.line['speed']:.4g} {of_joint('rad/s', self.type)}"
             needs = f"{self.line['torque']:.4g} {unit} at {speed}"
             return f"{needs} (limit {self.line['limit']:.4g} there) at {self.line['at_s']:.4g} s"
+        if kind == "brake" and self.holding:
+            return f"{self.holding.gravity:.4g} {unit} to hold against gravity (limit {self.holding.brake:.4g})"
         starts = self.breakaway > self.peak
         need, at = (self.breakaway, self.breakaway_at_s) if starts else (self.peak, self.peak_at_s)
         more = " to break away" if starts else ", where it was cut" if self.cut else ""
         return f"{need:.4g} {unit} (limit {self.peak_limit:.4g}) at {at:.4g} s{more or _most(self.of_peak)}"
 
 
-def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozenset()) -> Iterator[JointBudget]:
+def joint_budgets(
+    demand: Demand, limits: Limits, holding: Mapping[str, Holding], cut: frozenset[str] = frozenset()
+) -> Iterator[JointBudget]:
     """Yield the budget of each joint; `cut` names joints whose actuation was cut at an effort limit."""
     split, power, row = demand.split, demand.power, np.arange(len(demand.peak))
     limits = limits.at_mean_speed(demand.mean_speed)
@@ -148,6 +157,7 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
             of_peak={cause: float(torque[at_peak[i], i]) for cause, torque in split.torques.items()},
             of_rms={cause: float(part[i] / rms[i]) if rms[i] else 0.0 for cause, part in parts.items()},
             line=lines[i],
+            holding=holding.get(name),
             cut=name in cut,
         )
 

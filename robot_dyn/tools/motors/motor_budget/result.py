@@ -132,6 +132,17 @@ class MotorBudget(Result):
                 }
             )
             yield ""
+        if brakes := [(x, x.holding) for x in joints if x.holding]:
+            yield "brakes, and the largest torque of gravity found over the joint limits, below the bound Σ m g r:"
+            yield _table(
+                {
+                    "joint": [x.joint for x, _ in brakes],
+                    "unit": [of_joint("N m", x.type) for x, _ in brakes],
+                    **{key: [getattr(y, key) for _, y in brakes] for key in ("brake", "gravity", "bound")},
+                    "factor": [f"{y.factor:.2f}" for _, y in brakes],
+                }
+            )
+            yield ""
         yield "torque by cause at the peak:"
         yield _table(torque | at_peak | _by_cause("torque", [x.of_peak for x in joints]))
         yield ""
