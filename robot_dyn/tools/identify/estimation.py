@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 VISCOUS, COULOMB, OFFSET, STRIBECK = "viscous", "coulomb", "torque offset", "static - coulomb"
 TIME, ROTOR = "time offset", "rotor inertia"
-_LATEST_S = 0.02  # largest time offset, in [s]
+LATEST_S = 0.02  # largest time offset, in [s]
 _ITERATIONS, _SAME_S = 6, 2e-5
 _SMOOTH = 0.35  # cutoff of instruments from positions: noise of 3e-4 rad shifts no estimate by half a standard error
 
@@ -168,10 +168,10 @@ def estimate(
     check(rows, *map(signals.second_of, state))
     result = fit(rows)
     for _ in range(_ITERATIONS):
-        delta = float(np.clip(delta - result.values[-1], -_LATEST_S, _LATEST_S))
+        delta = float(np.clip(delta - result.values[-1], -LATEST_S, LATEST_S))
         rows = rows_at(delta, result.values[:-1])
         result = fit(rows)
-        if abs(result.values[-1]) < _SAME_S or abs(delta) == _LATEST_S:
+        if abs(result.values[-1]) < _SAME_S or abs(delta) == LATEST_S:
             break
     result = replace(result, values=np.append(result.values[:-1], delta))
     return Estimate(result, rows, signals.second_of(at), signals, state, instruments)

@@ -126,6 +126,8 @@ def _with_repeat(log: Log, t: np.ndarray, q: np.ndarray) -> Log:
     lag = int(np.argmax(correlation)) - (len(w) - 1)  # log.q[k] is again[k − lag]
     both = slice(max(lag, 0), min(len(log.t), len(again) + lag))
     one, other = log.q[both], again[both.start - lag : both.stop - lag]
+    if np.array_equal(one, other):
+        raise LogError("repeat is the log itself, with the same noise; record the motion a second time")
     apart = np.sqrt(((one - other) ** 2).mean(axis=0)) / log.q.std(axis=0)
     if (worst := float(apart.max())) > _ANOTHER:
         raise LogError(

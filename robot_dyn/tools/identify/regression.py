@@ -84,11 +84,16 @@ class Fit(Value):
         return np.sqrt(np.diag(self.covariance))
 
     @cached_property
-    def half_widths(self) -> np.ndarray:
-        """Half widths of the 95 % intervals, (p,)."""
+    def quantile(self) -> float:
+        """Half width of a 95 % interval in standard errors, by Student's distribution."""
         from scipy.stats import t
 
-        return t.ppf((1 + LEVEL) / 2, self.dof) * self.standard_errors
+        return float(t.ppf((1 + LEVEL) / 2, self.dof))
+
+    @property
+    def half_widths(self) -> np.ndarray:
+        """Half widths of the 95 % intervals, (p,)."""
+        return self.quantile * self.standard_errors
 
     @property
     def rms(self) -> np.ndarray:

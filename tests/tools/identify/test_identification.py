@@ -94,10 +94,19 @@ def test_a_second_log_may_start_at_another_time() -> None:
         assert np.abs(log.q - log.repeated).max() < 2 * np.abs(np.diff(log.q, axis=0)).max()
 
 
-def test_a_second_log_of_another_motion_is_refused() -> None:
-    other = logs.log(1)
-    with pytest.raises(LogError, match="repeat"):
-        read_log(logs.FILE, logs.log(0), repeat={**other, "q": other["q"][::-1]})
+def test_a_second_log_of_another_motion_or_the_log_itself_is_refused() -> None:
+    log, other = logs.log(0), logs.log(1)
+    for repeat in ({**other, "q": other["q"][::-1]}, log):
+        with pytest.raises(LogError, match="repeat"):
+            read_log(logs.FILE, log, repeat=repeat)
+
+
+def test_torques_that_are_too_late_are_refused() -> None:
+    """30 ms: the estimate is within 20 ms."""
+    log = logs.log(0)
+    late = {"t": log["t"][:-8], "q": log["q"][8:], "tau": log["tau"][:-8]}
+    with pytest.raises(LogError, match="ms"):
+        identify(logs.FILE, late)
 
 
 def test_static_friction_is_estimated_on_request() -> None:
@@ -307,12 +316,12 @@ def test_a_motion_that_determines_too_little_is_refused() -> None:
 
 
 def test_the_command_writes_the_corrected_file(tmp_path: Path) -> None:
-    log = logs.log(0)
     heads = ["t [s]", *(f"q {joint} [rad]" for joint in JOINTS), *(f"tau {joint} [N m]" for joint in JOINTS)]
-    table = np.column_stack([log["t"], log["q"], log["tau"]])
-    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=",".join(heads), comments="")
+    for seed, name in enumerate(("log.csv", "again.csv")):
+        table = np.column_stack([logs.log(seed)[key] for key in ("t", "q", "tau")])
+        np.savetxt(tmp_path / name, table, delimiter=",", header=",".join(heads), comments="")
     code = "import sys, robot_dyn.cli as cli; import robot_dyn.tools.identify.command; cli.main()"
-    options = "--output", tmp_path / "arm.urdf", "--repeat", tmp_path / "log.csv", "--effects", "urdf"
+    options = "--output", tmp_path / "arm.urdf", "--repeat", tmp_path / "again.csv", "--effects", "urdf"
     done = spawn("identify", "planar_2r", tmp_path / "log.csv", *options, code=code)
     assert done.returncode == 0, done.stderr
     assert b"wrist" not in done.stdout and b"joint_1 viscous" in done.stdout
