@@ -10,7 +10,7 @@ whose BIC differs by less than 6 are not distinguished by the log and are named 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, final
@@ -24,6 +24,8 @@ from robot_dyn.tools.identify.physical import Links
 
 if TYPE_CHECKING:
     from robot_dyn.tools.identify.estimation import Estimate, Friction, Model
+
+    Columns = Callable[..., np.ndarray]
 
 SEEN = 3.0  # rms of the residual of a joint, in units of its noise, from which a difference is seen
 ALONE = 0.9  # part of the difference that a single cause explains
@@ -109,15 +111,17 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: Friction |
         friction: The friction that the arm is supposed to have; None if it is fitted with each cause, which then cannot
             be friction.
     """
-    rows, n = found.rows, model.arm.n
+    signals, rows, n = found.signals, found.rows, model.arm.n
+    arm, state = model.arm.with_(armature=0.0), found.state
     r, own = len(model.stated), np.zeros(len(rows.names))
     own[:r] = model.stated
     if friction is not None:
         own[r:-1] = friction.values
     shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
     candidates = []
-    for *name, columns in _candidates(model, links, found, own, friction):
-        C = columns.reshape(rows.tau.size, -1)
+    for *name, columns in _candidates(arm, links, model, rows.Y, own, friction):
+        C = columns(*state)
+        C = (C if len(C) == len(rows.tau) else signals.second(C)).reshape(rows.tau.size, -1)
         seen = (np.abs(C).max(axis=0) > _NOTHING) | (name[0] == "load")  # whose first coefficient is its mass
         candidates.append((*name, C[:, seen]))
     y, used = (shifted - rows.Y @ own).ravel(), rows.used.reshape(-1)
@@ -173,39 +177,63 @@ def _fitted(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return A @ x, x, (V.T * inverse**2) @ V / np.outer(scale, scale)
 
 
+Candidate = tuple[str, str, str, float, "Columns"]
+
+
 def _candidates(
-    model: Model, links: Links, found: Estimate, own: np.ndarray, friction: Friction | None
-) -> Iterator[tuple[str, str, str, float, np.ndarray]]:
-    """Yield kind, place, unit, factor of the unit and derivative of the torques, (m, n, k), of each cause."""
-    arm, base, Y, second = model.arm.with_(armature=0.0), model.base, found.rows.Y, found.signals.second
-    n, c, r = arm.n, len(model.stated), len(base.columns)
+    arm: Robot, links: Links, model: Model, Y: np.ndarray, own: np.ndarray, friction: Friction | None
+) -> Iterator[Candidate]:
+    """Yield kind, place, unit, factor of the unit and derivative columns of each cause."""
+    base = model.base
+    joints = list(enumerate(zip(arm.joint_names, arm.joint_types, strict=True)))
+    zero = np.zeros(len(own))
 
-    def by_link(b: int, *changes: np.ndarray) -> np.ndarray:
-        return Y[..., :r] @ base.R[:, 10 * b : 10 * b + 10] @ links.X[b] @ np.transpose(changes)
+    def by_parameters(directions: np.ndarray) -> Columns:
+        full = np.zeros((len(own), len(directions)))
+        full[: len(base.columns)] = base.R @ directions.T
+        return lambda q, v, a: Y @ full
 
-    def at_joint(i: int, columns: np.ndarray) -> np.ndarray:
-        return columns[:, None] * np.eye(n)[i, :, None]
+    def of_joint_alone(i: int, *columns: int) -> Columns:
+        def alone(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+            result = np.zeros((*Y.shape[:2], len(columns)))
+            result[:, i] = Y[:, i][:, list(columns)]
+            return result
 
-    for b, (name, theta) in enumerate(zip(links.names, links.theta, strict=True)):
-        yield "mass", name, "kg", theta[0], by_link(b, theta)
-        yield "centre of mass", name, "m", 1.0, by_link(b, *(shifted_centre(theta, k) for k in range(3)))
-    yield "load", links.names[-1], "kg, kg m", 1.0, by_link(len(links.names) - 1, *np.eye(10))
-    q, v, a = found.state
-    for i, (joint, kind) in enumerate(zip(arm.joint_names, arm.joint_types, strict=True)):
-        yield "torque offset", joint, of_joint("N m", kind), 1.0, at_joint(i, Y[:, i, [c + 2 * n + i]])
-        h = _SMALL * np.eye(n)[i]
-        slope = (arm.inverse_dynamics(q - h, v, a) - arm.inverse_dynamics(q + h, v, a)) / (2 * _SMALL)
-        yield "position offset", joint, of_joint("rad", kind), 1.0, second(slope)[..., None]
+        return alone
+
+    for b, name in enumerate(links.names):
+        whole, m = np.zeros((3, links.theta.size)), links.theta[b, 0]
+        place = slice(10 * b, 10 * b + 10)
+        whole[0, place] = links.X[b] @ links.theta[b]
+        yield "mass", name, "kg", m, by_parameters(whole[:1])
+        for k in range(3):
+            whole[k, place] = links.X[b] @ shifted_centre(links.theta[b], k)
+        yield "centre of mass", name, "m", 1.0, by_parameters(whole)
+    last = slice(links.theta.size - 10, links.theta.size)
+    load = np.zeros((10, links.theta.size))
+    load[:, last] = links.X[-1].T
+    yield "load", links.names[-1], "kg, kg m", 1.0, by_parameters(load)
+    c = len(base.columns) + len(model.rotors)
+    n = arm.n
+    for i, (joint, kind) in joints:
+        yield "torque offset", joint, of_joint("N m", kind), 1.0, of_joint_alone(i, c + 2 * n + i)
+        yield "position offset", joint, of_joint("rad", kind), 1.0, _position_offset(arm, model, i)
         if friction is not None:
             curve = [c + 3 * n + s for s, j in enumerate(model.stribeck) if i == j]
-            yield "friction", joint, "N m s/rad, N m", 1.0, at_joint(i, Y[:, i, [c + i, c + n + i, *curve]])
-        yield "gain", joint, "%", 100.0, at_joint(i, (Y[:, i] @ own)[:, None])
+            yield "friction", joint, "N m s/rad, N m", 1.0, of_joint_alone(i, c + i, c + n + i, *curve)
+
+        def gain(q: np.ndarray, v: np.ndarray, a: np.ndarray, i: int = i) -> np.ndarray:
+            result = np.zeros((*Y.shape[:2], 1))
+            result[:, i, 0] = Y[:, i] @ own
+            return result
+
+        yield "gain", joint, "%", 100.0, gain
     if friction is not None:
-        both = np.zeros((len(own), 2))
+        both = np.stack([zero, zero], axis=1)
         both[c : c + n, 0], both[c + n : -1, 1] = own[c : c + n], own[c + n : -1]
-        yield "friction", "", "%", 100.0, Y @ both
-    yield "mounting", "", "°", 180 / np.pi, second(_tilted(arm, q))
-    yield "time offset", "", "ms", 1e3, -Y[..., -1:]
+        yield "friction", "", "%", 100.0, lambda q, v, a: Y @ both
+    yield "mounting", "", "°", 180 / np.pi, _mounting(arm)
+    yield "time offset", "", "ms", 1e3, lambda q, v, a: -Y[..., -1:]
 
 
 def shifted_centre(theta: np.ndarray, k: int) -> np.ndarray:
@@ -216,10 +244,24 @@ def shifted_centre(theta: np.ndarray, k: int) -> np.ndarray:
     return np.array([0.0, *(m * e), dI[0, 0], dI[0, 1], dI[1, 1], dI[0, 2], dI[1, 2], dI[2, 2]])
 
 
-def _tilted(arm: Robot, q: np.ndarray) -> np.ndarray:
+def _position_offset(arm: Robot, model: Model, i: int) -> Columns:
+    def columns(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        h = _SMALL * np.eye(arm.n)[i]
+        return ((arm.inverse_dynamics(q - h, v, a) - arm.inverse_dynamics(q + h, v, a)) / (2 * _SMALL))[..., None]
+
+    return columns
+
+
+def _mounting(arm: Robot) -> Columns:
     """Return the derivatives of gravity torques by rotations of the base about two axes orthogonal to gravity."""
-    g = np.array(arm.gravity)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # gravity along the axes of all joints
-        arms = [arm.with_(gravity=hat(axis) @ g) for axis in np.linalg.svd(g[None])[2][1:]]
-    return np.stack([np.asarray(tilted.N(q)) for tilted in arms], axis=-1)
+
+    def columns(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        g = np.array(arm.gravity)
+        across = np.linalg.svd(g[None])[2][1:]
+        turned = [hat(axis) @ g for axis in across]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # gravity along the axes of all joints
+            arms = [arm.with_(gravity=g) for g in turned]
+        return np.stack([np.asarray(tilted.N(q)) for tilted in arms], axis=-1)
+
+    return columns
