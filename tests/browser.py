@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import os
+import re
 import shutil
 import time
 from collections.abc import Iterator
@@ -141,3 +142,9 @@ const bounds = (object) => {
   return [low, high];
 };
 """
+
+
+def without_shapes(robot: Robot) -> Robot:
+    """The robot with ellipsoids of its inertias instead of meshes, for which a page takes a third of the time."""
+    text = robot.description.xml.decode()
+    return Robot.from_text(re.sub(r"<(visual|collision)\b.*?</\1>", "", text, flags=re.DOTALL))

@@ -22,6 +22,12 @@ def stress(cases: Iterable[Any]) -> list[Any]:
     return _marked(cases, pytest.mark.stress)
 
 
+def third(cases: Iterable[Any]) -> list[Any]:
+    """Every third case marked as long, the others for `make stress`; written as those of `long`."""
+    cases = list(cases)
+    return [*long(cases[::3]), *stress(case for i, case in enumerate(cases) if i % 3)]
+
+
 def _marked(cases: Iterable[Any], mark: pytest.MarkDecorator) -> list[Any]:
     made = [case if hasattr(case, "marks") else pytest.param(*_arguments(case)) for case in cases]
     return [pytest.param(*case.values, id=case.id, marks=[*case.marks, mark]) for case in made]
@@ -35,4 +41,4 @@ def robots(without: Collection[str] = ()) -> list[Any]:
     """Names of the catalog: eight, of which some are trees, slide, are coupled or float; a third of the others long."""
     names = [name for name in rd.list_robots() if name not in without]
     others = [name for name in names if name not in EIGHT]
-    return [*(name for name in names if name in EIGHT), *long(others[::3]), *stress(others[1::3] + others[2::3])]
+    return [*(name for name in names if name in EIGHT), *third(others)]

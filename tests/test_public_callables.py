@@ -13,7 +13,7 @@ import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import RobotDynWarning, shown
 from tests.campaigns.fuzz.campaign import HangError, limited
-from tests.long import long
+from tests.long import stress
 from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, public, wrong
 
 LIMIT_S = 20  # of one call; the machine may be busy
@@ -53,7 +53,7 @@ def test_wrong_arguments_are_refused(known: dict[str, Example], name: str) -> No
     assert not bad, "\n".join(bad)
 
 
-@pytest.mark.parametrize("name", [*sorted({*public()} - MEASURE), *long(sorted(MEASURE))])
+@pytest.mark.parametrize("name", [*sorted({*public()} - MEASURE), *stress(sorted(MEASURE))])
 def test_extreme_arguments_are_answered_or_refused(known: dict[str, Example], name: str) -> None:
     """Arrays without axes, scalars of NumPy, None, denormal and huge numbers, NUL in paths."""
     function, arguments = known[name]

@@ -38,7 +38,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 # Made by the library: their constructors take what it computed.
 RESULTS = {
     "Advice", "AlarmThreshold", "CFunction", "CSource", "Cause", "Certificate", "Checkup", "Comparison", "Contact",
-    "Cost", "Estimate", "Excitation", "ExternalTorque", "ExpectedPrecision", "HeldOut", "Identification",
+    "Cost", "Estimate", "Excitation", "Experiment", "ExternalTorque", "ExpectedPrecision", "HeldOut", "Identification",
     "InverseKinematics", "Meaning", "MotorBudget", "Motors", "Parameter", "PathPlan", "PayloadEstimate", "Plan",
     "Proof", "Rollouts", "RoundedAngle", "Run", "RunDifference", "SampledModel", "Sensitivity", "State",
     "StaticEstimate", "Stress", "SweepResult", "SymbolicEquations", "Trajectory", "Verdict", "WorkPrecision",
@@ -306,7 +306,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.radius, x=rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)),
         call(rd.plot, run=run, only=["torques"], joints=["hinge"], limits=u, theme="light", style="paper",
             width_mm=120.0),
-        call(rd.tools.export.c_source, arm_or_plant=robot, quantities=["N"], dtype="float32", name="arm"),
+        call(rd.tools.export.c_source, system=robot, quantities=["N"], dtype="float32", name="arm"),
         call(rd.tools.export.c_source(robot, ["N"]).write, folder=folder / "c", force=True),
         call(rd.tools.export.casadi, arm_or_plant=plant, quantity="N", open_parameters=True),
         call(rd.tools.export.parameter_values, plant=plant),
@@ -319,6 +319,8 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.identify.static, arm=robot, poses=rd.tools.identify.Poses(states, robot.N(states)), friction=0.5,
             noise=0.1, tilt=False),
         call(excited.save, path=folder / "excitation.csv"),
+        call(rd.tools.identify.Experiment((("mass", "gain"),), np.ones(1), np.ones(1), states, excited.plan).save,
+            path=folder / "motion.csv"),
         call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, repeat=log, gains=1.0,
             effects=[rd.effects.ViscousFriction(0.1)], cutoff_hz=6.0, slow=0.05),
         call(rd.tools.identify.payload, arm=robot, log=log, empty=log, link="pole", reference=excited.reference,

@@ -20,4 +20,5 @@ from robot_dyn.codegen.store.keys import digest_of_texts as digest_of_texts
 from robot_dyn.codegen.store.keys import processor_of_code as processor_of_code
 from robot_dyn.codegen.threads import thread_count as thread_count
 from robot_dyn.codegen.trace.from_casadi import program_of as program_of
+from robot_dyn.codegen.trace.tick import TickTrace as TickTrace
 from robot_dyn.codegen.trace.trace import Trace as Trace

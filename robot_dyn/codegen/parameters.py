@@ -110,14 +110,19 @@ def parameters(
     effects = tuple(effects)
     for i, name in enumerate(names_of(effects)):
         result += _of_part(effects[i], ("effect", i), f"{name}.", n)
-    if controller is not None:
-        result += _of_part(controller, CONTROLLER, "", n)
-        for path, label, part in controller.parts:
-            result += _of_part(part, CONTROLLER, label, n, f"{path}.")
-        for name, reference in controller.references.items():
-            result += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
-        for name, model in controller.models.items():
-            result += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
+    return (*result, *(() if controller is None else parameters_of_controller(controller, swept)))
+
+
+def parameters_of_controller(controller: Controller, swept: Collection[str] = ()) -> tuple[Parameter, ...]:
+    """Return the parameters of a controller, its parts, references and models."""
+    n, result = controller.n, []
+    result += _of_part(controller, CONTROLLER, "", n)
+    for path, label, part in controller.parts:
+        result += _of_part(part, CONTROLLER, label, n, f"{path}.")
+    for name, reference in controller.references.items():
+        result += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
+    for name, model in controller.models.items():
+        result += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
     return tuple(result)
 
 

@@ -277,6 +277,8 @@ def spline(t: np.ndarray, q: np.ndarray, ends: np.ndarray | None = None) -> tupl
         starts = s[inside][:-1]
         terms = [curve.derivative(r)(starts) / factorial(r) if r else curve(starts) for r in range(degree + 1)]
         coefficients = np.stack(terms, axis=1) / unit ** np.arange(degree + 1)[:, None]
+        if ends is not None:  # without rounding, so that a reference from rest is at rest
+            coefficients[0, 1 : degree // 2 + 1] = ends[0] / _FACTORIALS[1 : degree // 2 + 1, None]
         missed = float(np.abs(curve(s) - q).max())
     except (ValueError, np.linalg.LinAlgError):  # steps or samples overflow, or vanish next to others
         raise _without_spline(t, q, degree) from None

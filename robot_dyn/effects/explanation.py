@@ -133,7 +133,7 @@ def explanation(dynamics: Dynamics, effects: tuple[Effect, ...]) -> Explanation:
             f"N = {_sum([*weight, *(f'− τ_{name}' for name in forces)])}",
             " after ".join(["τ = u", *([", ".join(bounds)] if bounds else [])]),
         ),
-        (*edits, *(_term(parts, dynamics) for parts in _by_effect(effects))),
+        (*edits, *(Term(x[0].name, term_of(x), coefficients=as_they_act(x, dynamics)) for x in _by_effect(effects))),
         source=robot.description.source if hasattr(robot, "description") else "",
         findings=reservations(robot.description) if hasattr(robot, "description") else (),
     )
@@ -154,10 +154,6 @@ def _by_effect(effects: Iterable[Effect]) -> Iterator[list[Effect]]:
         parts.append(effect)
     if parts:
         yield parts
-
-
-def _term(parts: list[Effect], dynamics: Dynamics) -> Term:
-    return Term(parts[0].name, term_of(parts), coefficients=as_they_act(parts, dynamics))
 
 
 def term_of(parts: Iterable[Effect | type[Effect]]) -> str:

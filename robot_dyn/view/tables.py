@@ -7,7 +7,7 @@ from typing import Any
 
 from robot_dyn.queries.units import format_duration, joint_units
 from robot_dyn.simulation.comparison.difference import comparable
-from robot_dyn.simulation.comparison.differing_settings import differing_settings
+from robot_dyn.simulation.comparison.differing_settings import values_by_run
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
@@ -17,15 +17,11 @@ _MOST_SETTINGS = 60
 
 def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
     """Return the settings in which runs differ from the first; no rows if the runs are not of one robot."""
-    (_, first), *others = named
-    if any(not comparable(first, other) for _, other in others):
+    first, *others = (run for _, run in named)
+    if any(not comparable(first, other) for other in others):
         return {"runs": [], "rows": []}
-    pairs = [{setting.name: setting for setting in differing_settings(first, other)} for _, other in others]
-    rows = []
-    for name in list(dict.fromkeys(name for pair in pairs for name in pair))[:_MOST_SETTINGS]:
-        first_value = next(pair[name].a for pair in pairs if name in pair)
-        rows.append([name, first_value, *(pair[name].b if name in pair else first_value for pair in pairs)])
-    return {"runs": [name for name, _ in named], "rows": rows}
+    rows = [[name, *values] for name, values in values_by_run(first, *others).items()]
+    return {"runs": [name for name, _ in named], "rows": rows[:_MOST_SETTINGS]}
 
 
 def cost_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:

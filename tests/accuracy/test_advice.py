@@ -17,7 +17,7 @@ from robot_dyn.simulation.dynamics.stability import longest_step
 from tests.campaigns.estimates.advised import blow_up, limited
 from tests.campaigns.estimates.scenes import RAIL
 from tests.command import run
-from tests.long import long
+from tests.long import long, third
 from tests.loops import growth
 from tests.own_method import OwnImplicit
 from tests.two_rates import TwoRates
@@ -132,7 +132,7 @@ def test_runs_blow_up_where_the_limit_says() -> None:
 
 
 @pytest.mark.parametrize(
-    "late", [(0.4, 1.3), *long(pytest.param(each) for each in [(0.0, 0.0), (0.0, 0.5), (1.0, 0.5), (2.0, 1.0)])]
+    "late", [(0.4, 1.3), *third(pytest.param(each) for each in [(0.0, 0.0), (0.0, 0.5), (1.0, 0.5), (2.0, 1.0)])]
 )
 @pytest.mark.parametrize("name", ["kinova", "xarm7"])
 def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, late: tuple[float, float]) -> None:

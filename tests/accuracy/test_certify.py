@@ -17,7 +17,7 @@ from robot_dyn.accuracy.correct_digits import QUANTITIES
 from robot_dyn.lagrange import articulated_body
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.chains import body, chain
-from tests.long import long
+from tests.long import long, third
 
 GIVEN = {"q": [0.3, -1.1], "v": [0.5, 0.4], "a": [0.2, 0.9], "tau": [1.0, -2.0]}
 QUICK = {"samples": 100, "repeats": 1}
@@ -88,7 +88,7 @@ def test_decimals_of_the_file_are_held_to_their_float64() -> None:
     ("quantity", "name"),
     [
         (C, "planar_2r"),
-        *long([(M, "skew_tree"), *((each, "planar_2r") for each in (N, INVERSE_DYNAMICS, FORWARD_DYNAMICS))]),
+        *third([(M, "skew_tree"), *((each, "planar_2r") for each in (N, INVERSE_DYNAMICS, FORWARD_DYNAMICS))]),
     ],
     ids=lambda each: getattr(each, "name", each),
 )

@@ -27,7 +27,7 @@ from robot_dyn.scene import starter
 from robot_dyn.simulation import StateEquation, machine_code
 from robot_dyn.simulation.compiled.cache import machine_code_of_constants
 from tests.chains import body, chain
-from tests.long import long
+from tests.long import third
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -82,7 +82,7 @@ def test_viscous_friction_costs_what_is_counted_by_hand() -> None:
     assert added % 4 == 0 and 7 <= added // 4 <= 10
 
 
-@pytest.mark.parametrize("control", ["states", *long(["none", "continuous", "sampled"])])
+@pytest.mark.parametrize("control", ["states", *third(["none", "continuous", "sampled"])])
 def test_what_is_off_costs_nothing_and_parts_add_up(control: str) -> None:
     """All on = rigid bodies + each part + what several share; a part never adds to a setup that is without it."""
     given = setup(FRICTION, SPRING, *rd.effects.joint_stops(-1.0, 1.0), controller=CONTROLLERS[control])

@@ -17,7 +17,7 @@ from tests.campaigns.run_pairs import one_motion, two_motions
 from tests.chains import body, chain
 from tests.command import document
 from tests.command import run as ran
-from tests.long import long
+from tests.long import long, stress
 from tests.promised import check_document
 
 DAMPING, SPEED, DURATION = 0.8, 1.3, 0.5
@@ -178,7 +178,7 @@ def test_an_event_that_no_run_names_does_not_part_one_motion(order: int) -> None
     assert interpolated > 40
 
 
-@pytest.mark.parametrize("index", [0, 4, *long([1, 2, 3, 6, 7, 8, 17, 19, 20, 22, 23])])
+@pytest.mark.parametrize("index", [0, 4, *long([1, 2, 6, 7]), *stress([3, 8, 17, 19, 20, 22, 23])])
 def test_pairs_of_one_motion_do_not_part_and_pairs_that_differ_by_ten_times_their_errors_do(index: int) -> None:
     """Scenes of `run_pairs`; the whole campaign is `python -m tests.campaigns.run_pairs`."""
     one, two = one_motion(7, index), two_motions(7, index)

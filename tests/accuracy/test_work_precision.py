@@ -35,7 +35,7 @@ from robot_dyn.integrate import ButcherTableau, ExplicitRungeKutta
 from robot_dyn.queries import format_duration
 from robot_dyn.report import Budget
 from robot_dyn.scene import parse_scene, starter
-from tests.long import long
+from tests.long import long, third
 
 
 def swing(duration_s: float = 0.3) -> rd.Setup:
@@ -59,7 +59,7 @@ def ladder(candidate: MethodUnderTest, truth: Reference, first: int, last: int) 
 
 @pytest.mark.parametrize(
     ("name", "first", "last"),
-    [("RK4", 0, 3), *long([("Euler", 3, 6), ("Midpoint", 1, 4), ("GaussLegendre4", 0, 3), ("Rodas5PFixed", 0, 4)])],
+    [("RK4", 0, 3), *third([("Euler", 3, 6), ("Midpoint", 1, 4), ("GaussLegendre4", 0, 3), ("Rodas5PFixed", 0, 4)])],
 )
 def test_measured_orders_are_those_of_the_methods(smooth, name: str, first: int, last: int) -> None:
     """Slope = p + O(h).

@@ -16,7 +16,7 @@ import robot_dyn as rd
 from robot_dyn.cli import GROUPS, program
 from robot_dyn.cli.application import app
 from tests.command import MAIN, interrupted_at_work, refusal, run, said, spawn
-from tests.long import long
+from tests.long import long, stress
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_closed_stream_is_not_replaced_by_a_file_that_is_opened_later(tmp_path
     assert spawn(tmp_path / "x", code=code).returncode > 2
 
 
-@pytest.mark.parametrize("encoding", ["ascii", *long(["cp1252", "utf-16"])])
+@pytest.mark.parametrize("encoding", ["ascii", *long(["cp1252"]), *stress(["utf-16"])])
 @pytest.mark.parametrize(
     ("args", "code", "shown"),
     [

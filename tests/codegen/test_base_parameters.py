@@ -17,7 +17,7 @@ from robot_dyn.lagrange import Linkage, composite_body, magnitudes, newton_euler
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
 from robot_dyn.model import completed
 from robot_dyn.scene import of_scene, parse_scene
-from tests.long import long
+from tests.long import third
 from tests.random_trees import RandomTree, trees
 
 
@@ -43,7 +43,7 @@ def assert_unchanged(robot: rd.Robot, seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["ur5", "panda", "kinova", *long(["cart_pole", "mimic_chain", "skew_tree", "planar_2r"])]
+    "name", ["ur5", "panda", "kinova", *third(["cart_pole", "mimic_chain", "skew_tree", "planar_2r"])]
 )
 def test_the_equations_stay_the_same(name: str) -> None:
     for seed in range(5):

@@ -22,7 +22,7 @@ from robot_dyn.lagrange import floored, magnitudes
 from robot_dyn.queries import EQUATION
 from robot_dyn.queries import QUANTITIES as QUERIES
 from tests.codegen.arms import ARMS, compiled, states
-from tests.long import long
+from tests.long import third
 from tests.random_trees import RandomTree, trees
 from tests.user_parts import Push
 
@@ -42,7 +42,7 @@ SOME = [
 SOME += [("ur5", "forward_dynamics"), ("skew_tree", "inverse_dynamics")]  # six joints, coupled, a tree
 
 
-@pytest.mark.parametrize(("arm", "quantity"), [*SOME, *long(case for case in CASES if case not in SOME)])
+@pytest.mark.parametrize(("arm", "quantity"), [*SOME, *third(case for case in CASES if case not in SOME)])
 def test_each_quantity_agrees_with_pinocchio(arm: str, quantity: str) -> None:
     """One state: to 1e-12 of the terms added into it; forward dynamics to 8 n u κ more, κ ≤ 1e4 for these."""
     engine, asked = compiled(arm), EQUATION[quantity]
@@ -59,7 +59,7 @@ def test_each_quantity_agrees_with_pinocchio(arm: str, quantity: str) -> None:
 
 @pytest.mark.parametrize(
     ("arm", "quantity"),
-    [*SOME, *long(case for case in CASES if case[0] in ("ur5", "mimic_chain") and case not in SOME)],
+    [*SOME, *third(case for case in CASES if case[0] in ("ur5", "mimic_chain") and case not in SOME)],
 )
 def test_a_batch_is_its_states_one_by_one(arm: str, quantity: str) -> None:
     """The same instructions, fused and ordered otherwise: to 1e-13 of the largest; a last tile that overlaps too."""

@@ -19,7 +19,7 @@ from robot_dyn.codegen import Kernel, Kind, program_of
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.sine_groups import in_groups
 from robot_dyn.codegen.threads import shared
-from tests.long import long
+from tests.long import third
 
 
 class Own(np.ndarray):
@@ -137,7 +137,7 @@ def test_numbers_that_are_not_finite_are_reported(double: Kernel) -> None:
     [
         *((width, "float64") for width in (1, 7, 8, 17)),
         *((width, "float32") for width in (2, 9)),
-        *long(
+        *third(
             [
                 *((width, "float64") for width in (2, 9, 15, 36)),
                 *((width, "float32") for width in (1, 7, 8, 15, 17, 36)),

@@ -19,7 +19,7 @@ ARMS = {"ur5": "tool0", "panda": "panda_hand", "kinova": "j2s6s200_end_effector"
 WITH_FIVE = ARMS | {"so100": "gripper"}  # so100 has five axes
 
 
-SOME = ["ur5", "panda", *long(["kinova", "xarm7", "z1"])]
+SOME = ["ur5", "panda", *long(["z1"]), *stress(["kinova", "xarm7"])]
 
 
 def load(name: str) -> rd.Robot:

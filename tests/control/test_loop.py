@@ -13,7 +13,7 @@ from robot_dyn.accuracy.costs.step_cost import parts
 from robot_dyn.foundations import ControlError, QueryError
 from robot_dyn.simulation import RemarkKind, StateEquation, Verdict, machine_code
 from robot_dyn.simulation.setup.schedule import cuts
-from tests.long import long
+from tests.long import long, third
 from tests.loops import Q0, V0, Exact, exact, matrices, plant
 from tests.two_rates import TwoRates
 
@@ -51,7 +51,7 @@ def differences(made: rd.Trajectory, truth: Exact) -> float:
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 @pytest.mark.parametrize(
     ("measured", "acts"),
-    [(0.25, 0.75), (1.6, 2.45), *long([(0, 0), (0, 0.37), (0.37, 0), (1, 0.5), (0, 2), (2, 1)])],
+    [(0.25, 0.75), (1.6, 2.45), *third([(0, 0), (0, 0.37), (0.37, 0), (1, 0.5), (0, 2), (2, 1)])],
 )
 def test_delays_are_those_of_the_definition(engine: str, measured: float, acts: float) -> None:
     loop = rd.control.Loop(PD, measurement_delay_periods=measured, actuation_delay_periods=acts)

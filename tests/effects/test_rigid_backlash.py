@@ -7,7 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
-from tests.long import long
+from tests.long import long, third
 from tests.slides import slides
 
 ARM = rd.load("planar_2r")
@@ -27,7 +27,7 @@ def slide(restitution: float, engine: str, force: float, effects: tuple = ()) ->
 
 
 @pytest.mark.parametrize(
-    ("side", "restitution"), [(-1, 0.5), *long([(1, 1.0), (-1, 1.0), (1, 0.5), (1, 0.0), (-1, 0.0)])]
+    ("side", "restitution"), [(-1, 0.5), *third([(1, 1.0), (-1, 1.0), (1, 0.5), (1, 0.0), (-1, 0.0)])]
 )
 @BOTH
 def test_a_pushed_motor_bounces_at_an_end_of_the_gap_like_a_ball(restitution: float, side: int, engine: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 import robot_dyn as rd
 from tests.effects.test_effect_states import ARM, FRICTION, LEVEL, SLIDER, STIFFNESS, Q, beats
 from tests.effects.test_line_spring_damper import BETWEEN, TO_WORLD, TREE, state
-from tests.long import long
+from tests.long import third
 
 PLAN = rd.control.quintic(Q, [0.6, -0.3], 0.3)
 PID = rd.control.PID(PLAN, kp=90.0, ki=60.0, kd=20.0)
@@ -45,7 +45,7 @@ CASES = [
     ([BETWEEN], ON_TREE, STRUT),
     ([BETWEEN, TO_WORLD], ON_TREE,
      {"line_spring_damper 2.other_point": POINTS, "line_spring_damper 1.stiffness": [50.0, 90.0]}),
-    *long([
+    *third([
         (STATES, ON_ARM, {"lugre_friction.coulomb": [[1.0, 0.5], [0.3, 1.2]]}),
         (DRIVE, driven(0.0), STIFFNESSES),
         *(([BETWEEN], ON_TREE, {name: values}) for name, values in STRUT.items()),

@@ -109,6 +109,7 @@ def values() -> dict[str, Any]:
         (planned := rd.tools.identify.excite(ARM, 5.0, limits=BOUNDS, starts=1, compare_longer=False)),
         planned.expected, (poses := rd.tools.identify.Poses(np.eye(2), ARM.N(np.eye(2)))),
         rd.tools.identify.static(ARM, poses, friction=1.0),
+        rd.tools.identify.Experiment((("mass", "gain"),), np.ones(1), np.ones(1), np.eye(2), planned.plan),
         (identified := rd.tools.identify.identify(logs.FILE, logs.log(), reference=logs.reference())),
         rd.tools.identify.payload(logs.FILE, logs.log(), reference=logs.reference(), link="tip"),
         identified.parameters[0], identified.held_out, identified.verdict, identified.verdict.causes[0],

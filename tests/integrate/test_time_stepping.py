@@ -14,7 +14,7 @@ from robot_dyn.integrate.time_stepping import problem_rows
 from robot_dyn.simulation import DoubtKind
 from tests.campaigns.estimates.scenes import arms
 from tests.foundations.test_convex import minimum, problem
-from tests.long import long
+from tests.long import long, third
 
 ENGINES = ["interpreted", "compiled"]
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
@@ -165,7 +165,7 @@ HELD = {
 }
 
 
-@pytest.mark.parametrize(("name", "sampled"), [*long((name, False) for name in HELD), ("all", True)])
+@pytest.mark.parametrize(("name", "sampled"), [*third((name, False) for name in HELD), ("all", True)])
 def test_rollouts_are_the_runs_of_simulate(name: str, sampled: bool) -> None:
     """In both engines and in lanes, with equal events: they differ by rounding that the motion has magnified."""
     rng = np.random.default_rng(7)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import robot_dyn as rd
 from robot_dyn.cross_check import random_state
 from robot_dyn.lagrange import magnitudes, unit_diagonal_condition
-from tests.long import long
+from tests.long import stress
 from tests.random_trees import RandomTree, trees
 
 U = np.finfo(float).eps / 2
@@ -26,10 +26,10 @@ def state_of(robot: rd.Robot, seed: int) -> list[np.ndarray]:
 
 
 def law(few: int, many: int) -> Callable[[Callable[[RandomTree, int], None]], Callable[[int], None]]:
-    """A law that is held on a few random trees and seeds, and, as a long test, on many."""
+    """A law that is held on a few random trees and seeds, and, as a stress test, on many."""
 
     def over(check: Callable[[RandomTree, int], None]) -> Callable[[int], None]:
-        @pytest.mark.parametrize("examples", [few, *long([many])])
+        @pytest.mark.parametrize("examples", [few, *stress([many])])
         def test(examples: int) -> None:
             settings(max_examples=examples)(given(trees(), SEEDS)(check))()
 

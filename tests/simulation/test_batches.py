@@ -6,12 +6,12 @@ import pytest
 
 from tests.campaigns.batches.judge import judge
 from tests.campaigns.batches.scenes import FAMILIES
-from tests.long import long
+from tests.long import third
 
 SEED = 20261123
 
 
-@pytest.mark.parametrize("index", [0, *long(range(1, len(FAMILIES)))])
+@pytest.mark.parametrize("index", [0, *third(range(1, len(FAMILIES)))])
 def test_each_run_of_a_batch_is_the_run_of_simulate(index: int) -> None:
     """To a hundred times what a push by a few roundings grows to; the same steps, samples and outcome."""
     judged = judge(SEED, index)

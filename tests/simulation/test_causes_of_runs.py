@@ -9,7 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
-from tests.long import long
+from tests.long import long, third
 from tests.user_parts import Push
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))
@@ -45,7 +45,7 @@ def pull(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     [
         *((name, "compiled") for name in ("payload", "LuGre", "geared motors", "dry friction", "stops", "limits")),
         *long((name, "compiled") for name in ("friction and springs", "Dahl", "backlash")),
-        *long((name, "interpreted") for name in plants()),
+        *third((name, "interpreted") for name in plants()),
     ],
 )
 def test_causes_add_up_to_the_actuation(name: str, engine: str) -> None:

@@ -21,7 +21,7 @@ from tests.campaigns.estimates.scenes import FAMILIES, arms
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard.stiff_motion import stop
-from tests.long import long
+from tests.long import long, stress, third
 from tests.own_method import OwnImplicit
 from tests.user_parts import Push
 
@@ -36,14 +36,14 @@ SMOOTH = [index for index in range(SCENES) if FAMILIES[index % len(FAMILIES)] ==
 SWITCHED = sorted(set(range(SCENES)) - set(SMOOTH))
 
 
-@pytest.mark.parametrize("index", [*SWITCHED[:2], *long(SWITCHED[2:])])
+@pytest.mark.parametrize("index", [*SWITCHED[:2], *long(SWITCHED[2:6]), *stress(SWITCHED[6:])])
 def test_no_estimate_misleads_where_something_switches(index: int) -> None:
     """Against SciPy near rounding: an estimate that nothing warns of is at least 0.3 of the error."""
     judged = judge(SEED, index)
     assert not judged.misleads, str(judged)
 
 
-@pytest.mark.parametrize(("indices", "least", "most"), [(SMOOTH[:3], 2, 0), *long([(SMOOTH, 6, 1)])])
+@pytest.mark.parametrize(("indices", "least", "most"), [(SMOOTH[:3], 2, 0), *stress([(SMOOTH, 6, 1)])])
 def test_estimates_of_smooth_runs_are_within_a_factor_of_three(indices: list[int], least: int, most: int) -> None:
     """None misleads, and all usable ones but one are between 0.3 and 3 of the error; `make stress` asks 95 % of 600."""
     judged = [judge(SEED, index) for index in indices]
@@ -132,7 +132,7 @@ def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
     assert exact > 1e3 * run.error.at(run.error.until_s)
 
 
-@pytest.mark.parametrize(("seed", "index"), [(31, 32), *long([(20261126, 230), (20261128, 283), (31, 46), (41, 3)])])
+@pytest.mark.parametrize(("seed", "index"), [(31, 32), *third([(20261126, 230), (20261128, 283), (31, 46), (41, 3)])])
 def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
     """A swing, bristles and stops; longer steps show another order, or by chance that one, or magnify rounding."""
     judged = judge(seed, index, scene_of_all)

@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.effects import numbered
-from tests.long import long
+from tests.long import long, third
 
 DOUBLE = rd.load("planar_2r")
 SKEW, CART_POLE = rd.load("skew_tree"), rd.load("cart_pole")
@@ -32,7 +32,7 @@ SCENES = {
     "all, sampled": (rd.Plant(DOUBLE, [FRICTION, DRY, SPRING, WINDOW]), SAMPLED),
 }
 CASES = [pytest.param(*scene, id=name) for name, scene in SCENES.items()]
-scenes = pytest.mark.parametrize(("plant", "law"), [*long(CASES[:-1]), CASES[-1]])
+scenes = pytest.mark.parametrize(("plant", "law"), [*third(CASES[:-1]), CASES[-1]])
 
 
 @scenes

@@ -12,7 +12,7 @@ from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import EffectError, QueryError, TraceError, eigh, tanh
 from robot_dyn.model import completed
 from robot_dyn.simulation.compiled import cache
-from tests.long import long
+from tests.long import long, stress, third
 
 ARM = rd.load("planar_2r")
 TIP = ARM.frame_names[-1]
@@ -84,7 +84,7 @@ def test_another_structure_is_compiled() -> None:
     [
         (f"model.payload_mass:{TIP}", np.array([0.1, 2.5])),
         ("kp", np.array([[30.0, 20.0], [70.0, 80.0]])),
-        *long(
+        *third(
             [
                 ("external_wrench.wrench", np.array([[1.0, 2, 3, 0.4, 0.5, 0.6], [3.0, 1, -2, 0.1, 0.2, 0.9]])),
                 ("gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
@@ -215,7 +215,7 @@ UR5 = completed(rd.load("ur5"))[0]
 START = np.array([0.3, -0.9, 1.2, -0.6, 0.8, 0.2])
 
 
-@pytest.mark.parametrize("turn", ["free", *long(["kept", "turning"])])
+@pytest.mark.parametrize("turn", ["free", *long(["turning"]), *stress(["kept"])])
 def test_operational_space_is_compiled(turn: str) -> None:
     """With the orientation free, kept and turning by 2 rad; the eigenvectors are those of another method."""
     g = UR5.placement(START, "tool0")

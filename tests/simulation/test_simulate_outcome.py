@@ -13,7 +13,7 @@ from robot_dyn.control import Stateless
 from robot_dyn.effects import Conservative
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SingularError
 from robot_dyn.simulation import RemarkKind, Run
-from tests.long import long
+from tests.long import third
 from tests.user_parts import Push
 
 DOUBLE = rd.load("planar_2r")
@@ -106,7 +106,7 @@ def test_an_effect_may_be_interrupted_too() -> None:
     ("ending", "period"),
     [
         *((KeyboardInterrupt(), 0.0), (KeyboardInterrupt(), 0.01), (STRETCHED, 0.01), (np.nan, 0.0)),
-        *long([(STRETCHED, 0.0), (np.nan, 0.01), (np.inf, 0.0), (np.inf, 0.01)]),
+        *third([(STRETCHED, 0.0), (np.nan, 0.01), (np.inf, 0.0), (np.inf, 0.01)]),
     ],
 )
 @pytest.mark.parametrize("method", METHODS)

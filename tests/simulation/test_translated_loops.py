@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +24,7 @@ from robot_dyn.simulation.run.fixed_steps import samples_at_most
 from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.time_loop import time_loop
 from tests.campaigns.estimates.scenes import arms
-from tests.long import long
+from tests.long import long, stress, third
 
 ARM = rd.load("planar_2r")
 PLAIN = [name for name in FIXED_STEP if method(name).plain]
@@ -103,11 +102,6 @@ def test_a_fixed_step_gives_the_same_bits(name: str, sampled: bool) -> None:
 HELD = [rd.effects.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.effects.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
 GEAR = [rd.effects.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
 SOFT = [*HELD, *rd.effects.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
-REST = [
-    *product([ADAPTIVE[1], "GaussLegendre4", "Rodas5PFixed"], [None, SAMPLED]),
-    (ADAPTIVE[0], None),
-    ("RK4", SAMPLED),
-]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +110,9 @@ REST = [
         *((ADAPTIVE[0], BOUNDED, SAMPLED), ("RK4", BOUNDED, None)),
         *(("DOP853", GEAR, CONTINUOUS), ("DOP853", SOFT, SAMPLED)),
         *long([("RK4", GEAR, SAMPLED), ("Rodas5PFixed", HELD, CONTINUOUS)]),
-        *long((name, BOUNDED, controller) for name, controller in REST),
+        *long([(ADAPTIVE[1], BOUNDED, SAMPLED), ("GaussLegendre4", BOUNDED, None)]),
+        *stress([(ADAPTIVE[0], BOUNDED, None), (ADAPTIVE[1], BOUNDED, None), ("GaussLegendre4", BOUNDED, SAMPLED)]),
+        *stress([("RK4", BOUNDED, SAMPLED), *(("Rodas5PFixed", BOUNDED, law) for law in (None, SAMPLED))]),
     ],
 )
 def test_a_run_with_events_gives_the_same_bits(name: str, what: list[Any], controller: Any) -> None:
@@ -175,7 +171,7 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     [
         ("RK4", CONTINUOUS),
         ("GaussLegendre4", SAMPLED),
-        *long((name, SAMPLED) for name in PLAIN if name != "GaussLegendre4"),
+        *third((name, SAMPLED) for name in PLAIN if name != "GaussLegendre4"),
     ],
 )
 def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control.Controller) -> None:

@@ -28,7 +28,7 @@ from robot_dyn.simulation.compiled.machine_code import MachineCode
 from robot_dyn.simulation.run import event_handler
 from robot_dyn.simulation.setup.setup import CACHED
 from tests.campaigns.estimates.scenes import arms
-from tests.long import long
+from tests.long import third
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.3, -0.4]), np.array([0.5, -0.2])
@@ -144,7 +144,7 @@ def test_what_is_read_late_is_what_it_would_be_at_once_in_whatever_order(name: s
     assert rd.simulate(setup).summary.split("time:")[0] == reference.summary.split("time:")[0]
 
 
-@pytest.mark.parametrize("name", [*SHARED, *long(name for name in setups() if name not in SHARED)])
+@pytest.mark.parametrize("name", [*SHARED, *third(name for name in setups() if name not in SHARED)])
 def test_runs_of_one_setup_do_not_share_what_they_change(name: str) -> None:
     setup = replace(setups()[name])  # of which nothing is kept yet
     first = rd.simulate(setup)

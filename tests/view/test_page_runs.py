@@ -26,8 +26,7 @@ def runs():
     return followed(0.0), followed(0.5)
 
 
-@pytest.mark.parametrize("scheme", ["light", *long(["dark"])])
-@pytest.mark.parametrize("width", [1400, *long([390])])
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), *long([(390, "dark")])])
 def test_two_runs_show_desired_motion_difference_and_settings(browser, runs, width: int, scheme: str) -> None:
     """The difference that is drawn is that of the samples; the table names the payload alone."""
     a, b = runs

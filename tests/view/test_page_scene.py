@@ -7,7 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened, until
-from tests.long import long
+from tests.long import long, third
 
 Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
 
@@ -165,7 +165,7 @@ def box(view, selector: str) -> tuple[float, float, float, float]:
     return tuple(view.ask(where))
 
 
-@pytest.mark.parametrize("width, height", [(1400, 900), (390, 844), *long([(1920, 1000), (1200, 800), (1199, 800)])])
+@pytest.mark.parametrize("width, height", [(1400, 900), (390, 844), *third([(1920, 1000), (1200, 800), (1199, 800)])])
 def test_the_arm_stays_in_view_while_the_plots_scroll(browser, page, width: int, height: int) -> None:
     """From 1200 px on it stands left of them, as high as the window; else it and the slider stick above them."""
     with opened(browser, page, size=(width, height)) as view:

@@ -21,7 +21,7 @@ from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import Doubt, DoubtKind, Ledger, Outcome, Reason
 from robot_dyn.view import PLOTS, PlotError
 from robot_dyn.view.plots.plots import MOST_JOINTS
-from tests.long import long
+from tests.long import long, stress
 from tests.view.plotted import cart_pole, cells, headings, legend, lines, many, stretched, ur5
 
 MM = 25.4  # in an inch
@@ -83,6 +83,7 @@ def test_options_without_meaning_are_refused(run, options: dict, text: str) -> N
         plot(run, **options)
 
 
+@pytest.mark.long
 def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
     """In the overview each has a row of 8.4 mm or more."""
     thirty = replace(many(run, 30), extremes=None)
@@ -97,8 +98,10 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
         plot(many(run, MOST_JOINTS + 1), "joints")
 
 
-@pytest.mark.parametrize("width", [80.0, 180.0])
-@pytest.mark.parametrize("name", ["overview", "phase", "energy"])
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [("overview", 80.0), ("phase", 180.0), *long([("energy", 80.0), ("overview", 180.0)])],
+)
 def test_numbers_of_an_axis_do_not_overlap(run, name: str, width: float) -> None:
     """Two numbers or more on each axis that has any; small values are written as 5e−4 and need more room."""
     small = replace(run, q=run.q * 1e-3, v=run.v * 1e-3)
@@ -379,7 +382,7 @@ def test_what_a_run_lacks_has_no_axes(run) -> None:
     assert not cells(unknown, "u") and "u is 0" not in headings(unknown)
 
 
-@pytest.mark.parametrize("width", [80, 300, *long([120])])
+@pytest.mark.parametrize("width", [80, *long([300]), *stress([120])])
 def test_eight_joints_fit_a_page_of_a4_at_any_width(width: float) -> None:
     """Whatever is asked for, in [mm]; no text covers another, and all have 7 to 9 pt."""
     for name in PLOTS:

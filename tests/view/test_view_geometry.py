@@ -12,7 +12,7 @@ from robot_dyn.description import description
 from robot_dyn.view import drawing
 from tests.browser import opened
 from tests.drawings import WRITTEN_FOR_GAZEBO, Z_UP, box, boxes, stated_boxes
-from tests.long import long
+from tests.long import long, stress, third
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
@@ -22,7 +22,7 @@ FLOAT32 = 1e-6  # [m]: coordinates of a few metres at most, in float32
 # ur5, panda, kinova, romeo: Collada, Z_UP; icub, hextilt: Y_UP; xarm7, talos_left_arm: STL; laikago: OBJ
 @pytest.mark.parametrize(
     "name",
-    ["ur5", "hextilt_flying_arm_5", *long(["panda", "kinova", "icub", "xarm7", "talos_left_arm", "laikago", "romeo"])],
+    ["ur5", "hextilt_flying_arm_5", *third(["panda", "kinova", "icub", "xarm7", "talos_left_arm", "laikago", "romeo"])],
 )
 def test_bounding_box_of_each_link_is_that_of_its_files(name: str) -> None:
     """Read independently: raw coordinates times the nodes of the scene, the unit, the scale."""
@@ -84,7 +84,7 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
 @pytest.mark.parametrize(
     "name",
     ["simple_humanoid", "skew_tree", "iris",
-     *long(["alex_nub_hands", "baxter", "hyq_no_sensors", "human", "pr2", "quadruped", "romeo_laas_small", "solo12",
+     *third(["alex_nub_hands", "baxter", "hyq_no_sensors", "human", "pr2", "quadruped", "romeo_laas_small", "solo12",
             "talos_full_v2", "tiago_no_hand", "anymal_b"])],
 )  # fmt: skip
 def test_every_link_with_a_visual_is_drawn(name: str) -> None:
@@ -106,7 +106,7 @@ def test_every_link_with_a_visual_is_drawn(name: str) -> None:
         assert all(0 <= x <= 1 for x in piece.rgba)
 
 
-@pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10), ("kinova", 9), ("twodofs", 1)])])
+@pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10)]), *stress([("kinova", 9), ("twodofs", 1)])])
 def test_each_link_fills_the_box_of_its_pieces(browser, name: str, least: int) -> None:
     """In the browser's scene, placed by Pinocchio; single precision in a scene of about 1 m: 2e-6."""
     arm = rd.load(name)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, final
+from typing import Any, Protocol, final
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def symbolic_plant(plant: Plant, bodies: Dynamics, values: Values | None = None)
 
 
 def symbolic_controller(
-    controller: Controller, models: Mapping[str, Dynamics], values: Values, pieces: Sequence[Piece]
+    controller: Controller, models: Mapping[str, Dynamics], values: Values, pieces: Sequence[Motion]
 ) -> Controller:
     """Return the same controller in symbols.
 
@@ -55,7 +55,7 @@ def symbolic_controller(
         controller: Controller to trace.
         models: Models of the robot in symbols, by attribute of the controller.
         values: Symbols for the parameters of the controller and its references.
-        pieces: Polynomials of its references on a segment.
+        pieces: Motions of its references, for example their polynomials on a segment.
     """
     parts: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
     remaining = iter(pieces)
@@ -90,6 +90,14 @@ def whichever_way(name: str, function: Callable[[], Array], of_arm_inside: str =
         has_robot = isinstance(error, QueryError) and Symbol.__name__ in str(error)  # a query with symbols
         remedy = of_arm_inside if has_robot else REMEDY
         raise TraceError(f"{name} cannot be compiled ({because(error)}): {remedy}") from error
+
+
+class Motion(Protocol):
+    """A motion in symbols, instead of a piecewise polynomial of a reference."""
+
+    def at(self, t: Symbol, /) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration at t."""
+        ...
 
 
 @final

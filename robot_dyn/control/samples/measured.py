@@ -91,10 +91,10 @@ def from_samples(
         ends = "rest"
     if start_s is not None:
         t = _shifted(t, number("start_s", start_s, error=PlanError))
-    at_rest = ends == "rest"
-    reference = (
-        PiecewisePolynomial(*spline(t, q, np.zeros((2, 2, q.shape[1])))) if at_rest else Samples(t, q, **table.more)
-    )
+    if ends == "rest":
+        reference = PiecewisePolynomial(*spline(t, q, np.zeros((2, 2, arm.n))))
+    else:
+        reference = Samples(t, q, **table.more)
     method = "; ".join([_method(arm, t, q, ends), *([table.note] if table.note else [])])
     return Plan(
         *(arm.name, arm.joint_names, arm.joint_types, reference, method),

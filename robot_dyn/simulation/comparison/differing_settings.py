@@ -55,6 +55,13 @@ def differing_settings(a: TrajectoryData, b: TrajectoryData) -> tuple[DifferingS
     return tuple(_pair(name, first, second) for name in names if first.get(name) != second.get(name))
 
 
+def values_by_run(first: TrajectoryData, *others: TrajectoryData) -> dict[str, list[str]]:
+    """Return the settings in which runs differ from the first, each with its value in every run."""
+    pairs = [{setting.name: setting for setting in differing_settings(first, other)} for other in others]
+    of_first = {name: setting.a for pair in pairs for name, setting in pair.items()}
+    return {name: [a, *(pair[name].b if name in pair else a for pair in pairs)] for name, a in of_first.items()}
+
+
 def run_names(*runs: TrajectoryData) -> tuple[str, ...]:
     """Return distinct names of runs: robots if these differ; otherwise files, settings that differ, or numbers.
 
@@ -71,9 +78,7 @@ def _names(runs: tuple[TrajectoryData, ...]) -> Iterator[tuple[str, ...]]:
     if all("file" in run.metadata for run in runs):
         stems = ((Path(run.metadata["file"]).stem, run.metadata.get("run")) for run in runs)
         yield tuple(" run ".join(filter(None, parts)) for parts in stems)
-    pairs = [{x.name: x for x in differing_settings(runs[0], run)} for run in runs[1:]]
-    first = {name: setting.a for pair in pairs for name, setting in pair.items()}
-    values = {name: [a, *(pair[name].b if name in pair else a for pair in pairs)] for name, a in first.items()}
+    values = values_by_run(*runs)
     short = {name: by_run for name, by_run in values.items() if max(map(len, (name, *by_run))) <= _NAMED}
     if len(values) == len(short) == 2:
         last = {name: name.rpartition(".")[2] for name in short}  # with units and paths two do not fit a legend

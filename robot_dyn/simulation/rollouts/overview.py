@@ -146,8 +146,7 @@ def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
         return
     extremes, by_joint = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
-        plant, controller = runs._parts(setup, run)
-        of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]})
+        of_run = with_values(setup, runs._of_run(setup, run))
         for remark in held_by_friction(of_run, extremes[run], runs.t[runs.t <= runs.ended_s[run]], units(runs)):
             by_joint.setdefault(remark.joint, []).append((run, remark))
     for pairs in by_joint.values():

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, final
+from typing import Annotated, Any, final
 
 import numpy as np
 
-from robot_dyn.control.controller import Controller
-from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.store import NOT_STORED, Layout
@@ -97,11 +95,7 @@ class RolloutsData(RunData):
         if self.setup is None or self.ends[run].ending is not Ending.DIVERGED:
             return self.ends[run]
         if run not in self._judged:
-            plant, controller = self._parts(self.setup, run)
-            start = {"q0": self.q0[run], "v0": self.v0[run]}
-            setup = with_values(
-                self.setup, {"plant": plant, "controller": controller, **start}
-            )  # checked before the run
+            setup = with_values(self.setup, self._of_run(self.setup, run))  # checked before the run
             self._judged[run] = reason_of(setup, self.ends[run], samples_of(self, run))
         return self._judged[run]
 
@@ -120,14 +114,13 @@ class RolloutsData(RunData):
         if setup is None:
             raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
         run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
-        plant, controller = self._parts(setup, run)
-        start = {"q0": self.q0[run], "v0": self.v0[run]}
-        return replace(setup, plant=plant, controller=controller, estimate_error=True, **start)
+        return replace(setup, estimate_error=True, **self._of_run(setup, run))
 
-    def _parts(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
-        """Return plant and controller of a run, with its parameters and noise."""
+    def _of_run(self, setup: Setup, run: int) -> dict[str, Any]:
+        """Return the attributes of the setup of a run: its start, and its parts with its parameters and noise."""
         number = run if self.numbers is None else int(self.numbers[run])
-        return parts_of_run(setup, {name: x[run] for name, x in self.varied.items()}, number)
+        plant, controller = parts_of_run(setup, {name: x[run] for name, x in self.varied.items()}, number)
+        return {"plant": plant, "controller": controller, "q0": self.q0[run], "v0": self.v0[run]}
 
 
 def samples_of(runs: RolloutsData, run: int) -> Samples:

@@ -45,6 +45,7 @@ from robot_dyn.simulation.run.time_loop import apply_tick, changes_torque, conse
 
 _EARLY = 1e-9  # fraction of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # repetitions of a step for an event
+_FARTHEST = 2.0  # steps: the root is within the step, except for the error of its dense output
 _SHORT = 1e-8  # fraction of a step: over such a part of it y is a straight line, to rounding
 _WATCHED = 8  # steps between energy checks
 
@@ -180,7 +181,7 @@ def event_loop(
                 return h, shift, e
             if k == _ROOTS - 1 or (abs(shift) > h and event >= coordinates(table)):
                 break  # a function that jumps: where it is bracketed
-            h = max(h + shift, 0.0)
+            h = min(max(h + shift, 0.0), _FARTHEST * whole)
         return h, 0.0, e
 
     def record_step(
@@ -247,8 +248,8 @@ def is_due(k: int, period: float, t: float, end: float) -> bool:
 
 
 def reject(loop: Loop, table: EventTable, control: StepControl, h: float, e: float) -> None:
-    """Reject a step of length h to an event, with the error e; a shorter one is next."""
-    control.next_h[0] = shortened(control, h, e)
+    """Reject a step of length h to an event, with the error e; the next is shorter than the whole step."""
+    control.next_h[0] = shortened(control, min(h, control.h[0]), e)
     start_table(table, loop.lanes, loop.position.time[0])
 
 

@@ -26,12 +26,13 @@ def export_c(
     quantities: str | None = None,
     dtype: str = "float64",
     name: str | None = None,
+    controller: bool = False,
     effects: Effects = None,
     force: Force = False,
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Write the equations of an arm, or of a scene, as C.
+    """Write an arm, a scene or its controller as C.
 
     The folder then holds a header, a source file, CMakeLists.txt and a self-test for ctest.
 
@@ -40,17 +41,23 @@ def export_c(
         quantities (M,C,N,…): Functions: M, C, N, inverse_dynamics, forward_dynamics; by default all of up to 8 joints.
         dtype: float64 for double, float32 for float.
         name: Prefix of the names in C.
+        controller: Write the tick of the scene's controller instead.
     """
     if robot.endswith(".toml"):
         if options.stated or effects:
             raise QueryError(f"{robot}: a scene states its robot and effects; leave out the options of a robot")
-        plant = rd.read_scene(robot).plant
+        setup = rd.read_scene(robot)
+        if controller and setup.controller is None:
+            raise QueryError(f"{robot}: states no controller; add [control], or leave out --controller")
+        exported = setup.controller if controller and setup.controller else setup.plant
+    elif controller:
+        raise QueryError("--controller needs a scene that states one: robot-dyn export-c scene.toml --controller")
     else:
         arm = options.load(robot)
-        plant = rd.Plant(arm, effects) if effects else arm
+        exported = rd.Plant(arm, effects) if effects else arm
     names = None if quantities is None else [x.strip() for x in quantities.split(",")]
     with bar(description="exporting"):
-        source = rd.tools.export.c_source(plant, names, dtype=dtype, name=name)
+        source = rd.tools.export.c_source(exported, names, dtype=dtype, name=name)
     paths = source.write(output, force=force)
     show(source, as_json=as_json)
     for path in paths:

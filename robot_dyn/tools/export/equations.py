@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, final
+from typing import final
 
 import casadi as ca
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen import CompiledDynamics, CompiledPlant, Engine, Parameter
+from robot_dyn.codegen import CompiledDynamics, CompiledPlant, Engine, Parameter, Program
 from robot_dyn.effects import SetValued, Stateful
 from robot_dyn.foundations import ExportError, QueryError, choice, shown
 from robot_dyn.queries import Quantity
+from robot_dyn.tools.export.exported import Exported
+from robot_dyn.tools.export.operations import evaluated
 
 QUANTITIES = ("M", "C", "N", "inverse_dynamics", "forward_dynamics")
 
 
 @final
 @dataclass(frozen=True)
-class Equations:
+class Equations(Exported):
     """The traced equations of an arm or a plant.
 
     Attributes:
@@ -30,6 +31,16 @@ class Equations:
 
     compiled: CompiledDynamics | CompiledPlant
 
+    kind, states = "dynamics", 10_000
+
+    @property
+    def name(self) -> str:
+        return self.robot.name
+
+    @property
+    def title(self) -> str:
+        return f"{self.name}: tau = M(q) a + C(q, v) v + N"
+
     @property
     def robot(self) -> rd.Robot:
         """The robot, with right angles at full precision."""
@@ -37,23 +48,11 @@ class Equations:
 
     @property
     def right_angles(self) -> tuple[str, ...]:
-        """Angles that the file states with too few digits, and that are right angles here, as text."""
         return self._rigid.right_angles
 
-    @cached_property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the vector p: finite coefficients of effects, gravity and payloads of a plant; () of an arm."""
-        declared = self._all
-        return tuple(x for x in declared if x.size and x.declared.can_vary and np.isfinite(x.value).all())
-
     @property
-    def _all(self) -> tuple[Parameter, ...]:
+    def declared(self) -> tuple[Parameter, ...]:
         return self.compiled.parameters if isinstance(self.compiled, CompiledPlant) else ()
-
-    @cached_property
-    def p(self) -> np.ndarray:
-        """Values of the parameters, (P,)."""
-        return np.concatenate([np.zeros(0), *map(values_of, self.parameters)])
 
     @property
     def _rigid(self) -> CompiledDynamics:
@@ -74,26 +73,18 @@ class Equations:
         """
         compiled = self.compiled
         trace = compiled.trace(name) if isinstance(compiled, CompiledPlant) else compiled.engine.traces[name]
-        arguments = dict(zip(self.row(name).arguments, trace.function.sx_in(), strict=False))
-        values = list(arguments.values())
-        if self._all:
-            p = ca.SX.sym("p", len(self.p))
-            values.append(self._filled(p if is_open else ca.DM(self.p)))
-            arguments |= {"p": p}
-        result = trace.function(*values)
-        uses = {key: x for key, x in arguments.items() if key not in ("t", "p") or ca.depends_on(result, x)}
-        return ca.Function(name, [*uses.values()], [ca.cse(result)], [*uses], [result_name(name)])
+        names = (*self.row(name).arguments, *(["p"] if self.declared else []))
+        return self.bound(name, trace.function, names, [result_name(name)], ("t", "p"), is_open=is_open)
 
-    def _filled(self, p: Any) -> Any:
-        """Return the parameters of the trace, for those that are open."""
-        parts, start = [], 0
-        for parameter in self._all:
-            if parameter in self.parameters:
-                parts.append(p[start : start + parameter.size])
-                start += parameter.size
-            else:
-                parts.append(ca.DM(values_of(parameter)))
-        return ca.vertcat(*parts)
+    def check(self, name: str, function: ca.Function, program: Program, dtype: str) -> None:
+        """Compare a program with the independent implementation that kernels are checked with."""
+        engine, arguments = self.engine(name), function.name_in()
+        state = {key: x.astype(dtype).astype(float) for key, x in engine.self_check.states().items()}
+        theirs, effects = engine.truth(name, state)
+        p = np.tile(self.p, (len(state["q"]), 1))
+        inputs = [x[:, None] if x.ndim == 1 else x for x in (({**state, "p": p})[key] for key in arguments)]
+        ours = evaluated(program, inputs, dtype).reshape(theirs.shape)
+        engine.self_check.check(engine.quantities[name], ours, theirs, dtype, effects)
 
 
 def equations_of(arm_or_plant: rd.Robot | rd.Plant) -> Equations:
@@ -142,8 +133,3 @@ def chosen(equations: Equations, quantities: Iterable[str] | None) -> tuple[str,
 def result_name(name: str) -> str:
     """Return the letter of a result."""
     return {"inverse_dynamics": "tau", "forward_dynamics": "a"}.get(name, name)
-
-
-def values_of(parameter: Parameter) -> np.ndarray:
-    """Return the entries of a parameter that are inputs."""
-    return parameter.value.ravel()[list(parameter.entries)]

@@ -7,7 +7,8 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.foundations import truth
-from robot_dyn.tools.export.equations import chosen, equations_of, result_name, values_of
+from robot_dyn.tools.export.equations import chosen, equations_of, result_name
+from robot_dyn.tools.export.exported import values_of
 
 
 def casadi(arm_or_plant: rd.Robot | rd.Plant, quantity: str, *, open_parameters: bool = False) -> ca.Function:

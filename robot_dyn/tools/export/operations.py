@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -72,13 +72,13 @@ def math_functions(program: Program) -> set[str]:
     return used.union(*(re.findall(r"(\w+)\{f\}", text) for text in texts))
 
 
-def statements(program: Program, arguments: Sequence[str], result: str, dtype: str) -> Iterator[str]:
+def statements(program: Program, arguments: Sequence[str], results: Mapping[str, int], dtype: str) -> Iterator[str]:
     """Yield the body of a C function: arguments are read first and results written last, so that they may overlap.
 
     Args:
         program: The program.
         arguments: Names of its inputs; one named t is a number, the others are arrays.
-        result: Name of the array of results.
+        results: Lengths of the arrays of results by name, in the order of the program's outputs.
         dtype: "float64" or "float32".
     """
     real, f = ("float", "f") if dtype == "float32" else ("double", "")
@@ -100,7 +100,8 @@ def statements(program: Program, arguments: Sequence[str], result: str, dtype: s
         for k, text in zip(op.results, texts, strict=True):
             if k in used:
                 yield f"const {real} {names[k]} = {text.format(*operands, **own)};"
-    yield from (f"{result}[{k}] = {names[value]};" for k, value in enumerate(program.outputs))
+    places = (f"{result}[{k}]" for result, size in results.items() for k in range(size))
+    yield from (f"{place} = {names[value]};" for place, value in zip(places, program.outputs, strict=True))
 
 
 def evaluated(program: Program, inputs: Sequence[np.ndarray], dtype: str) -> np.ndarray:

@@ -8,8 +8,9 @@ Errors are divided by a scale of each entry, in which joints with other units or
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, final
 
@@ -22,28 +23,56 @@ from robot_dyn.foundations import MissingTimeError, OnFirstUse
 from robot_dyn.tools.export.equations import Equations
 from robot_dyn.tools.export.operations import evaluated
 
-_FASTEST = 3.0  # rad/s or m/s, of joints without a speed limit
+FASTEST = 3.0  # rad/s or m/s, of joints without a speed limit
 _FARTHEST = {"prismatic": 1.0}  # m, of joints without position limits; π rad of others
-_MOST_ACCELERATION = 10.0  # rad/s² or m/s²
+MOST_ACCELERATION = 10.0  # rad/s² or m/s²
 UNITS = {"float64": 2.0**-53, "float32": 2.0**-24}  # largest relative error of rounding
 
 
-@final
 @dataclass(frozen=True, eq=False)
-class States:
-    """Random states within the limits of an arm and the reference's results there.
+class States(ABC):
+    """Random states, and the results of a reference there.
 
     Attributes:
-        equations: The equations.
         dtype: Precision of the states.
         count: Number of states.
         seed: Seed of the random numbers.
     """
 
-    equations: Equations
     dtype: str
     count: int
-    seed: int = 0
+    seed: int = field(default=0, kw_only=True)
+
+    @cached_property
+    @abstractmethod
+    def inputs(self) -> Mapping[str, np.ndarray]:
+        """Arguments by name, (count, size)."""
+
+    @abstractmethod
+    def results(self, name: str) -> np.ndarray:
+        """Return a quantity by the reference, (count, …)."""
+
+    @abstractmethod
+    def scale(self, name: str) -> np.ndarray:
+        """Return the scale of the entries of a quantity, in the shape of one result."""
+
+    def largest_error(self, name: str, program: Program, arguments: Sequence[str]) -> float:
+        """Return the largest error of a program at the states, divided by the scale."""
+        results = self.results(name)
+        ours = evaluated(program, [self.inputs[x] for x in arguments], self.dtype)
+        return float(np.max(np.abs(ours.reshape(results.shape) - results) / self.scale(name)))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class StatesOfArm(States):
+    """Random states within the limits of an arm.
+
+    Attributes:
+        equations: The equations.
+    """
+
+    equations: Equations
 
     @cached_property
     def reference(self) -> rd.Robot | rd.Plant:
@@ -53,13 +82,13 @@ class States:
 
     @cached_property
     def inputs(self) -> Mapping[str, np.ndarray]:
-        """Arguments by name, (count, n), and t (count, 1); torques are those of random accelerations."""
+        """Arguments by name; torques are those of random accelerations."""
         robot, rng = self.equations.robot, np.random.default_rng(self.seed)
         state = {
             "t": rng.uniform(0, 10, (self.count, 1)),
             "q": rng.uniform(*limits(robot, "q"), (self.count, robot.n)),
             "v": rng.uniform(*limits(robot, "v"), (self.count, robot.n)),
-            "a": rng.uniform(-1, 1, (self.count, robot.n)) * _MOST_ACCELERATION,
+            "a": rng.uniform(-1, 1, (self.count, robot.n)) * MOST_ACCELERATION,
         }
         state = {name: x.astype(self.dtype).astype(float) for name, x in state.items()}
         tau = self._asked("inverse_dynamics", state).astype(self.dtype).astype(float)
@@ -67,7 +96,6 @@ class States:
         return state | {"tau": tau, "u": tau, "p": p}
 
     def results(self, name: str) -> np.ndarray:
-        """Return a quantity by the reference, (count, …)."""
         return self._results[name]
 
     @cached_property
@@ -88,7 +116,6 @@ class States:
         return np.maximum(d, 1e-6 * d.max())  # of a joint without inertia
 
     def scale(self, name: str) -> np.ndarray:
-        """Return the scale of the entries of a quantity, in the shape of one result."""
         d, state = self._d, self.inputs
         if name == "M":
             return np.outer(d, d)
@@ -98,12 +125,6 @@ class States:
         if name == "N":  # may vanish, as for axes that are all vertical
             return np.maximum(np.max(np.abs(self.results(name)) / d) * d, 1e-6 * torque)
         return torque[:, None] / np.max(np.abs(state["v"]), axis=0) if name == "C" else torque
-
-    def largest_error(self, name: str, program: Program, arguments: Sequence[str]) -> float:
-        """Return the largest error of a program at the states, divided by the scale."""
-        results = self.results(name)
-        ours = evaluated(program, [self.inputs[x] for x in arguments], self.dtype)
-        return float(np.max(np.abs(ours.reshape(results.shape) - results) / self.scale(name)))
 
 
 def bound(program: Program, boxes: Sequence[Sequence[arb]], unit: float) -> list[float] | None:
@@ -154,7 +175,7 @@ def limits(robot: rd.Robot, argument: str) -> tuple[np.ndarray, np.ndarray]:
         lower, upper = robot.lower, robot.upper
         return np.where(np.isfinite(lower), lower, -far), np.where(np.isfinite(upper), upper, far)
     speed = robot.velocity_limit
-    speed = np.where(np.isfinite(speed) & (speed > 0), speed, _FASTEST)
+    speed = np.where(np.isfinite(speed) & (speed > 0), speed, FASTEST)
     return -speed, speed
 
 

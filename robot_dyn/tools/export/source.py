@@ -1,18 +1,22 @@
-"""C source of the equations of an arm or a plant: a header, a source file, a self-test and CMakeLists.txt."""
+"""C source of an arm, a plant or the tick of a controller: a header, a source file, a self-test and CMakeLists.txt."""
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from pathlib import Path
 from typing import final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import DTypeLike
 
 import robot_dyn as rd
-from robot_dyn.codegen import Program, name_of_dtype, program_of
+from robot_dyn.codegen import Parameter, Program, name_of_dtype, program_of
+from robot_dyn.control import Controller
 from robot_dyn.foundations import (
     UNREPORTED,
     Answer,
@@ -28,11 +32,13 @@ from robot_dyn.foundations import (
     truth,
 )
 from robot_dyn.queries import coefficient_unit, joint_units
-from robot_dyn.tools.export.equations import Equations, chosen, equations_of, result_name
-from robot_dyn.tools.export.operations import evaluated, literal, math_functions, statements
-from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
+from robot_dyn.tools.export.equations import Equations, chosen, equations_of
+from robot_dyn.tools.export.exported import values_of
+from robot_dyn.tools.export.operations import literal, math_functions, statements
+from robot_dyn.tools.export.rounding import UNITS, StatesOfArm, bound, box_of
+from robot_dyn.tools.export.tick import Tick, TickStates, tick_of
 
-_STATES, _OF_TEST = 10_000, 20
+_OF_TEST = 20  # states of the self-test
 _LONGEST = 20_000  # instructions; compilers take minutes for longer functions
 _STATED = 1e4  # rounding units, about 1e-12 in double: larger bounds are not stated
 _MARGIN, _LEAST = 16, 8  # tolerance of the self-test, in largest differences or in rounding units
@@ -44,11 +50,11 @@ class CFunction:
     """One exported function.
 
     Attributes:
-        quantity: Name of the quantity.
-        arguments: Names of its arguments; the array of results is the last one.
+        quantity: Name of the quantity, or "tick".
+        arguments: Names of its arguments; the arrays of results are the last ones.
         instructions: Number of operations.
         difference: Largest difference from Pinocchio (and the interpreted effects) at 10 000 random states within the
-            limits, divided by the scale of the entry.
+            limits, or from the controller's own code at 1000, divided by the scale of the entry.
         bound: Proven bound of the rounding error of M or N at all states within the limits, divided by the same scale;
             None if it is not below 10⁴ rounding units.
     """
@@ -63,7 +69,7 @@ class CFunction:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class CSource(Answer, Value):
-    """C source of an arm or a plant.
+    """C source of an arm, a plant or a controller.
 
     Attributes:
         name: Prefix of all names in C.
@@ -111,7 +117,9 @@ class CSource(Answer, Value):
             (x.quantity, ", ".join(x.arguments), x.instructions, f"{x.difference:.1e}", _bound(x.bound))
             for x in self.functions
         ]
-        yield f"{self.name}, {_real(self.dtype)}: differences from Pinocchio at {_STATES} states, and proven bounds"
+        tick = self.functions[0].quantity == "tick"
+        of = f"the controller in Python at {Tick.states}" if tick else f"Pinocchio at {Equations.states}"
+        yield f"{self.name}, {_real(self.dtype)}: differences from {of} states{'' if tick else ', and proven bounds'}"
         yield Table(head, tuple(rows), right=head[3:])
         yield f"functions of <math.h>: {', '.join(self.math) or 'none'}"
         if self.renamed:
@@ -119,71 +127,78 @@ class CSource(Answer, Value):
 
 
 def c_source(
-    arm_or_plant: rd.Robot | rd.Plant,
+    system: rd.Robot | rd.Plant | Controller,
     quantities: Iterable[str] | None = None,
     *,
     dtype: DTypeLike = "float64",
     name: str | None = None,
 ) -> CSource:
-    """Return C source of M, C, N, inverse and forward dynamics, without heap and without static data.
+    """Return C source of M, C, N, inverse and forward dynamics, or of a controller's tick; no heap, no static data.
 
-    Parameters of a plant (coefficients of effects, gravity, payloads) are entries of an array p; those of a robot are
-    constants. Right angles that the file states with few digits are exact, as in `rd.compiled`.
+    Coefficients of effects and controllers, gravity and payloads are entries of an array p; other numbers of a robot
+    are constants. Right angles that the file states with few digits are exact, as in `rd.compiled`.
+
+    The tick maps the measured q, v, the reference q_d, v_d, a_d at that time, and the states z to torques u and the
+    next states; inputs that a law does not use are left out. The period is a constant; bounds of a plant are not in it.
 
     Args:
-        arm_or_plant: A robot, or a plant with smooth or piecewise effects without states.
+        system: A robot, a plant with smooth or piecewise effects without states, or a controller.
         quantities: Some of "M", "C", "N", "inverse_dynamics", "forward_dynamics"; by default all of up to eight
-            joints, N and inverse dynamics of more.
+            joints, N and inverse dynamics of more. None for a controller.
         dtype: np.float64 for double or np.float32 for float, or its name.
-        name: Prefix of all names in C; by default the name of the robot.
+        name: Prefix of all names in C; by default the name of the robot, or the kind of controller.
 
     Returns:
         The files, with the errors of each function.
 
     Raises:
-        ExportError: If an effect switches, holds joints or has states, or a function would be too long.
+        ExportError: If an effect switches, holds joints or has states, a function would be too long, or a controller
+            is continuous with states, has delays or noise, or cannot be traced.
         QueryError: If an argument is not allowed.
         SelfCheckError: If the equations differ from an independent implementation.
     """
     if name is not None and not (isinstance(name, str) and name.strip()):
         raise QueryError(f"name must be a text, such as 'ur5', got {shown(name)}")
-    dtype, equations = name_of_dtype(dtype), equations_of(arm_or_plant)
-    names = chosen(equations, quantities)
-    traced = {x: equations.function(x) for x in names}
-    programs = {x: (program_of(function), tuple(function.name_in())) for x, function in traced.items()}
-    for quantity, (program, _) in programs.items():
+    dtype = name_of_dtype(dtype)
+    if isinstance(system, Controller):
+        if quantities is not None:
+            raise QueryError(f"quantities must be None for a controller, got {shown(quantities)}")
+        exported, names = tick_of(system), ("tick",)
+    else:
+        exported = equations_of(system)
+        names = chosen(exported, quantities)
+    traced = {x: exported.function(x) for x in names}
+    programs = {x: program_of(function) for x, function in traced.items()}
+    for quantity, program in programs.items():
         if len(program) > _LONGEST:
             raise ExportError(f"{quantity} has {len(program)} instructions, more than {_LONGEST}; leave it out")
-        _check(equations, quantity, *programs[quantity], dtype)
-    states = States(equations, dtype, _STATES)
-    functions = tuple(_function(states, x, *programs[x]) for x in names)
+        if isinstance(exported, Equations):
+            exported.check(quantity, traced[quantity], program, dtype)
+    states = _states(exported, dtype, exported.states)
+    functions = tuple(_function(states, x, programs[x], tuple(traced[x].name_in())) for x in names)
     renamed: dict[str, str] = {}
-    prefix = _identifier(name or equations.robot.name, renamed, "arm_")
-    math = tuple(sorted(set().union(*(math_functions(program) for program, _ in programs.values()))))
-    text = _Text(equations, prefix, dtype, functions, math)
+    prefix = _identifier(name or exported.name, renamed, "arm_")
+    math = tuple(sorted(set().union(*map(math_functions, programs.values()))))
+    text = _Text(exported, prefix, dtype, functions, math, traced)
     files = {
-        f"{prefix}_dynamics.h": text.header(renamed),
-        f"{prefix}_dynamics.c": text.source(programs),
+        f"{prefix}_{exported.kind}.h": text.header(renamed),
+        f"{prefix}_{exported.kind}.c": text.source(programs),
         f"{prefix}_self_test.c": text.self_test(states),
-        "CMakeLists.txt": _CMAKE.replace("@", prefix),
+        "CMakeLists.txt": _CMAKE.replace("@_dynamics", f"{prefix}_{exported.kind}").replace("@", prefix),
     }
     return CSource(prefix, dtype, functions, math, renamed, files)
 
 
-def _check(equations: Equations, quantity: str, program: Program, arguments: Sequence[str], dtype: str) -> None:
-    """Compare a program with the independent implementation that kernels are checked with."""
-    engine = equations.engine(quantity)
-    state = {key: x.astype(dtype).astype(float) for key, x in engine.self_check.states().items()}
-    theirs, effects = engine.truth(quantity, state)
-    p = np.tile(equations.p, (len(state["q"]), 1))
-    inputs = [x[:, None] if x.ndim == 1 else x for x in (({**state, "p": p})[key] for key in arguments)]
-    ours = evaluated(program, inputs, dtype).reshape(theirs.shape)
-    engine.self_check.check(engine.quantities[quantity], ours, theirs, dtype, effects)
+def _states(exported: Equations | Tick, dtype: str, count: int, seed: int = 0) -> StatesOfArm | TickStates:
+    of_kind = TickStates if isinstance(exported, Tick) else StatesOfArm
+    return of_kind(dtype, count, exported, seed=seed)  # pyright: ignore[reportArgumentType]  of that kind
 
 
-def _function(states: States, quantity: str, program: Program, arguments: tuple[str, ...]) -> CFunction:
+def _function(
+    states: StatesOfArm | TickStates, quantity: str, program: Program, arguments: tuple[str, ...]
+) -> CFunction:
     unit, largest = UNITS[states.dtype], None
-    if quantity in ("M", "N") and "t" not in arguments:
+    if isinstance(states, StatesOfArm) and quantity in ("M", "N") and "t" not in arguments:
         boxes = [box_of(states.equations, x) for x in arguments]
         if (errors := bound(program, boxes, unit)) is not None:
             largest = float(np.max(errors / states.scale(quantity).ravel()))
@@ -212,98 +227,128 @@ def _bound(x: float | None) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return text of a file for a comment: ASCII, on one line, without the end of a comment."""
-    plain = text.replace("²", "^2").replace("³", "^3").replace("*/", "* /").replace("/*", "/ *")
-    return "".join(x if x.isascii() and x.isprintable() else "?" for x in plain)
+    """Return text of a file for a comment: ASCII, without the end of a comment; a dot over a letter is ' after it."""
+    for symbol, plain in {"²": "^2", "³": "^3", "−": "-", "·": " ", "*/": "* /", "/*": "/ *"}.items():
+        text = text.replace(symbol, plain)
+    letters = unicodedata.normalize("NFD", text).replace("\u0307", "'").replace("\u0302", "")
+    return "".join(x if x.isascii() and x.isprintable() else "?" for x in letters)
 
 
 @final
 @dataclass(frozen=True)
 class _Text:
-    """Texts of the files of one arm."""
+    """Texts of the files."""
 
-    equations: Equations
+    exported: Equations | Tick
     prefix: str
     dtype: str
     functions: tuple[CFunction, ...]
     math: tuple[str, ...]
+    traced: Mapping[str, ca.Function]
 
     def header(self, renamed: dict[str, str]) -> str:
-        robot, upper = self.equations.robot, self.prefix.upper()
+        exported, upper, kind = self.exported, self.prefix.upper(), self.exported.kind
         rows = [("function", "instructions", "difference", "bound")]
         rows += [(x.quantity, str(x.instructions), f"{x.difference:.1e}", _bound(x.bound)) for x in self.functions]
-        constants = [(f"{upper}_SIZE_Q", robot.n, "number of joints")]
-        for i, joint in enumerate(robot.joint_names):
-            unit = joint_units("q", [robot.joint_types[i]])
+        sizes = {name: size for function in self.traced.values() for name, size in _sizes(function)[0].items()}
+        joint_types = exported.robot.joint_types if exported.robot else (None,) * sizes["q"]
+        constants = [(f"{upper}_SIZE_Q", sizes["q"], "number of joints")]
+        for i, joint in enumerate(exported.robot.joint_names if exported.robot else ()):
+            unit = joint_units("q", [joint_types[i]])
             constants.append((f"{upper}_Q_{_identifier(joint, renamed).upper()}", i, f"{joint}, {unit}"))
-        start, values = 0, []
-        for parameter in self.equations.parameters:
-            entries = parameter.value.ravel()[list(parameter.entries)].tolist()
-            unit = coefficient_unit(parameter.declared, robot.joint_types)
-            of = "" if parameter.size == parameter.value.size else f" {list(parameter.entries)}"
-            text = f"{parameter.name}{of}: {', '.join(f'{x:g}' for x in entries)} {unit}"
+        if "z" in sizes:
+            constants.append((f"{upper}_SIZE_Z", sizes["z"], "number of states"))
+        start = 0
+        for parameter in exported.parameters:
+            text = _value(parameter, joint_types)
             constants.append((f"{upper}_P_{_identifier(parameter.name, renamed).upper()}", start, text))
-            start, values = start + parameter.size, [*values, *entries]
-        if values:
+            start += parameter.size
+        if start:
             constants.append((f"{upper}_SIZE_P", start, "number of parameters"))
-        numbers = ", ".join(literal(x, self.dtype) for x in values)
-        table = (" *   {:20}{:16}{:14}{}".format(*row) for row in rows)
+        numbers = ", ".join(literal(x, self.dtype) for x in exported.p.tolist())
         initialiser = f"\n/* Initialiser of p, with these values. */\n#define {upper}_P_VALUES {{{numbers}}}\n"
+        period = f"\n/* Period of the tick, in s: a constant of the code. */\n#define {upper}_PERIOD_S "
+        values = initialiser if start else ""
+        values += f"{period}{literal(exported.period_s, self.dtype)}\n" if exported.period_s else ""
+        table = (" *   {:20}{:16}{:14}{}".format(*row).rstrip() for row in rows)
+        notes = [f"Right angle at full precision: {x}" for x in exported.right_angles]
+        notes += [f"Constant of the code: {_value(x, joint_types)}" for x in exported.constants]
         prototypes = "".join(f"\n/* {_DESCRIPTIONS[x.quantity]} */\n{self.prototype(x)};\n" for x in self.functions)
         return _HEADER.format(
-            name=self.prefix,
-            upper=upper,
+            title=_comment(exported.title),
+            guard=f"{upper}_{kind.upper()}_H",
             version=_comment(rd.__version__),
-            robot=_comment(robot.name),
             real=_real(self.dtype),
-            angles="".join(f" * Right angle at full precision: {_comment(x)}.\n" for x in self.equations.right_angles),
-            math=", ".join(x + "f" * (self.dtype == "float32") for x in self.math) or "none",
-            states=_STATES,
+            errors=_ERRORS[kind].format(states=exported.states),
+            notes="".join(f" * {_comment(x)}.\n" for x in notes),
+            math=(", ".join(x + "f" * (self.dtype == "float32") for x in self.math) or "none")
+            + " (GCC may join sine and cosine to sincos)" * ("sin" in self.math),
             table="\n".join(table),
             constants="\n".join(f"    {key} = {value}, /* {_comment(text)} */" for key, value, text in constants),
-            values=initialiser if values else "",
+            values=values,
             prototypes=prototypes,
         )  # fmt: skip
 
     def prototype(self, function: CFunction) -> str:
         """Return the declaration of a function."""
-        real, n = _real(self.dtype), self.equations.robot.n
-        sizes = {"p": len(self.equations.p)}
-        arguments = [f"{real} t" if x == "t" else f"const {real} {x}[{sizes.get(x, n)}]" for x in function.arguments]
-        result = f"{real} {result_name(function.quantity)}[{self._entries(function)}]"
-        return f"void {self.prefix}_{function.quantity}({', '.join([*arguments, result])})"
+        real, (inputs, results) = _real(self.dtype), _sizes(self.traced[function.quantity])
+        arguments = [f"{real} t" if x == "t" else f"const {real} {x}[{size}]" for x, size in inputs.items()]
+        arguments += [f"{real} {x}[{size}]" for x, size in results.items()]
+        return f"void {self.prefix}_{function.quantity}({', '.join(arguments)})"
 
-    def _entries(self, function: CFunction) -> int:
-        n = self.equations.robot.n
-        return n * n if function.quantity in ("M", "C") else n
-
-    def source(self, programs: Mapping[str, tuple[Program, tuple[str, ...]]]) -> str:
-        parts = [f'#include "{self.prefix}_dynamics.h"\n\n#include <math.h>\n']
+    def source(self, programs: Mapping[str, Program]) -> str:
+        parts = [f'#include "{self.prefix}_{self.exported.kind}.h"\n\n#include <math.h>\n']
         for function in self.functions:
-            program, arguments = programs[function.quantity]
-            lines = statements(program, arguments, result_name(function.quantity), self.dtype)
+            results = _sizes(self.traced[function.quantity])[1]
+            lines = statements(programs[function.quantity], function.arguments, results, self.dtype)
             parts.append("\n".join([f"\n{self.prototype(function)}\n{{", *(f"    {line}" for line in lines), "}\n"]))
         return "".join(parts)
 
-    def self_test(self, drawn: States) -> str:
+    def self_test(self, drawn: StatesOfArm | TickStates) -> str:
         """Return a program that compares each function with the reference at random states."""
-        states, real = States(self.equations, self.dtype, _OF_TEST, seed=1), _real(self.dtype)
-        used = [x for x in ("t", "q", "v", "a", "tau", "u", "p") if any(x in f.arguments for f in self.functions)]
+        states, real = _states(self.exported, self.dtype, _OF_TEST, seed=1), _real(self.dtype)
+        used = dict.fromkeys(x for function in self.functions for x in function.arguments)
         parts = [_of_array(real, f"in_{x}", states.inputs[x], self.dtype) for x in used]
         calls = []
         for function in self.functions:
-            name, entries = function.quantity, self._entries(function)
+            name, results = function.quantity, _sizes(self.traced[function.quantity])[1]
             tolerance = max(_MARGIN * function.difference, _LEAST * UNITS[self.dtype]) * drawn.scale(name)
             parts.append(_of_array(real, f"expected_{name}", states.results(name).reshape(_OF_TEST, -1), self.dtype))
             parts.append(_of_array(real, f"tolerance_{name}", tolerance.reshape(1, -1), self.dtype))
-            inputs = ", ".join(f"in_{x}[k][0]" if x == "t" else f"in_{x}[k]" for x in function.arguments)
+            arguments = [f"in_{x}[k][0]" if x == "t" else f"in_{x}[k]" for x in function.arguments]
+            starts = accumulate(results.values(), initial=0)
+            arguments += ["result" + f" + {start}" * bool(start) for start, _ in zip(starts, results, strict=False)]
             calls.append(
-                _CALL.format(name=name, function=f"{self.prefix}_{name}", entries=entries, inputs=inputs, real=real)
+                _CALL.format(
+                    name=name,
+                    function=f"{self.prefix}_{name}",
+                    entries=sum(results.values()),
+                    arguments=", ".join(arguments),
+                    real=real,
+                )
             )
         f = "f" if self.dtype == "float32" else ""
         return _TEST.format(
-            name=self.prefix, states=_OF_TEST, arrays="\n".join(parts), calls="".join(calls), real=real, f=f
+            name=f"{self.prefix}_{self.exported.kind}",
+            states=_OF_TEST,
+            arrays="\n".join(parts),
+            calls="".join(calls),
+            real=real,
+            f=f,
         )
+
+
+def _sizes(function: ca.Function) -> tuple[dict[str, int], dict[str, int]]:
+    """Return the lengths of the inputs and of the results of a function by name."""
+    inputs = {name: function.numel_in(name) for name in function.name_in()}
+    return inputs, {name: function.numel_out(name) for name in function.name_out()}
+
+
+def _value(parameter: Parameter, joint_types: Sequence[str | None]) -> str:
+    """Return a parameter with its value and unit as text."""
+    of = "" if parameter.size == parameter.value.size else f" {list(parameter.entries)}"
+    unit = coefficient_unit(parameter.declared, joint_types)
+    return f"{parameter.name}{of}: {', '.join(f'{x:g}' for x in values_of(parameter))} {unit}"
 
 
 def _of_array(real: str, name: str, values: np.ndarray, dtype: str) -> str:
@@ -317,26 +362,36 @@ _DESCRIPTIONS = {
     "N": "Gravity minus the torques of the effects, N.",
     "inverse_dynamics": "Torques tau = M a + C v + N.",
     "forward_dynamics": "Accelerations a = (torques - C v - N) / M.",
+    "tick": "Torques u; next states z_next of z, if there are any: z is 0 at the start.",
+}
+
+_ERRORS = {
+    "dynamics": """\
+ * difference: largest difference from Pinocchio at {states} random states within the limits.
+ * bound: proven bound of the rounding error at all states within the limits, for constants rounded once, and a sine
+ *     and cosine within one unit in the last place; "-" if there is none, or a large one. It holds without -ffast-math.
+ * Both are divided by a scale: d_i d_j of M_ij with d_i = sqrt(max M_ii); s_i = d_i max_j(|tau_j| / d_j) of
+ * a torque; s_i / max|v_j| of C_ij; max_j(|a_j| d_j) / d_i of an acceleration.
+""",
+    "controller": """\
+ * difference: largest difference from the controller in Python at {states} random states, each divided by the largest
+ *     value of its entry, or by 1e-4 of the largest of all if that is more.
+""",
 }
 
 _HEADER = """\
-/* {robot}: tau = M(q) a + C(q, v) v + N in {real}, written by robot_dyn {version}.
+/* {title} in {real}, written by robot_dyn {version}.
  *
  * No heap, no static data: functions may run in any thread or interrupt. Results may overlap arguments. Arguments are
  * not checked; they must be finite. Functions of <math.h>: {math}.
  *
 {table}
  *
- * difference: largest difference from Pinocchio at {states} random states within the limits.
- * bound: proven bound of the rounding error at all states within the limits, for constants rounded once, and a sine
- *     and cosine within one unit in the last place; "-" if there is none, or a large one. It holds without -ffast-math.
- * Both are divided by a scale: d_i d_j of M_ij with d_i = sqrt(max M_ii); s_i = d_i max_j(|tau_j| / d_j) of
- * a torque; s_i / max|v_j| of C_ij; max_j(|a_j| d_j) / d_i of an acceleration.
- *
-{angles} * Units are SI: q in rad or m, v in rad/s or m/s, a in rad/s^2 or m/s^2, torques in N m or N, t in s.
+{errors} *
+{notes} * Units are SI: q in rad or m, v in rad/s or m/s, a in rad/s^2 or m/s^2, torques in N m or N, t in s.
  */
-#ifndef {upper}_DYNAMICS_H
-#define {upper}_DYNAMICS_H
+#ifndef {guard}
+#define {guard}
 
 #ifdef __cplusplus
 extern "C" {{
@@ -358,7 +413,7 @@ _CALL = """
     worst = 0;
     for (k = 0; k < {states}; k++) {{
         {real} result[{entries}];
-        {function}({inputs}, result);
+        {function}({arguments});
         worst = larger(worst, result, expected_{name}[k], tolerance_{name}[0], {entries});
     }}
     printf("%-18s %.3f of the tolerance\\n", "{name}", (double)worst);
@@ -366,8 +421,8 @@ _CALL = """
 """.replace("{states}", str(_OF_TEST))
 
 _TEST = """\
-/* Compares {name}_dynamics with results of an independent implementation at {states} random states. */
-#include "{name}_dynamics.h"
+/* Compares {name} with results of an independent implementation at {states} random states. */
+#include "{name}.h"
 
 #include <math.h>
 #include <stdio.h>

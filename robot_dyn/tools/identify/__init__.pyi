@@ -1,6 +1,7 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.tools.identify.carried import PayloadEstimate as PayloadEstimate
 from robot_dyn.tools.identify.carried import payload as payload
+from robot_dyn.tools.identify.discrimination import Experiment as Experiment
 from robot_dyn.tools.identify.excitation import Excitation as Excitation
 from robot_dyn.tools.identify.excitation import excite as excite
 from robot_dyn.tools.identify.identification import identify as identify
@@ -18,6 +19,8 @@ from robot_dyn.tools.identify.verdict import Verdict as Verdict
 __all__: list[str]
 
 # Names that only tools and tests import.
+from robot_dyn.tools.identify.discrimination import DECISIVE as DECISIVE
+from robot_dyn.tools.identify.discrimination import experiment_of as experiment_of
 from robot_dyn.tools.identify.estimation import Estimate as Estimate
 from robot_dyn.tools.identify.estimation import Model as Model
 from robot_dyn.tools.identify.estimation import estimate as estimate
@@ -27,9 +30,13 @@ from robot_dyn.tools.identify.information import Information as Information
 from robot_dyn.tools.identify.information import gram as gram
 from robot_dyn.tools.identify.log import Log as Log
 from robot_dyn.tools.identify.log import read_log as read_log
+from robot_dyn.tools.identify.physical import MARGIN as MARGIN
+from robot_dyn.tools.identify.physical import distance as distance
 from robot_dyn.tools.identify.physical import links_of as links_of
+from robot_dyn.tools.identify.physical import nearest_bodies as nearest_bodies
 from robot_dyn.tools.identify.physical import nearest_possible as nearest_possible
 from robot_dyn.tools.identify.physical import pseudo_inertia as pseudo_inertia
+from robot_dyn.tools.identify.physical import whitening as whitening
 from robot_dyn.tools.identify.regression import Fit as Fit
 from robot_dyn.tools.identify.regression import Rows as Rows
 from robot_dyn.tools.identify.regression import fit as fit

@@ -31,7 +31,7 @@ from robot_dyn.foundations import (
 from robot_dyn.tools.identify.estimation import Estimate, Model
 from robot_dyn.tools.identify.identification import CUTOFF_HZ, estimated
 from robot_dyn.tools.identify.log import LogError, read_log
-from robot_dyn.tools.identify.physical import MARGIN, centred, nearest_bodies, pseudo_inertia, seen_from
+from robot_dyn.tools.identify.physical import MARGIN, centred, nearest_bodies, pseudo_inertia, seen_from, whitening
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -140,7 +140,7 @@ def payload(
         y, covariance = y - other, covariance + spread
     A = R @ _in_bodies(arm, link)
     sizes = np.array([1.0, *[_SIZE_M] * 3, *[_SIZE_M**2] * 6])
-    L = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    L = whitening(covariance)
     W, z = L @ A * sizes, L @ y
     U, s, V = np.linalg.svd(W, full_matrices=False)
     seen = s > _BLIND * s[0]

@@ -100,15 +100,7 @@ class Excitation(Answer, Value):
         Raises:
             PlanError: If the suffix is not .csv, or the file cannot be written.
         """
-        path, stream = target(path, _TABLE, PlanError), io.StringIO()
-        t = np.linspace(0.0, self.duration_s, round(self.duration_s * self.rate_hz) + 1)
-        joints = list(zip(self.plan.joint_names, self.plan.joint_types, strict=True))
-        units = {"q": "rad", "v": "rad/s", "a": "rad/s²"}
-        heads = [f"{name} {joint} [{of_joint(unit, kind)}]" for name, unit in units.items() for joint, kind in joints]
-        writer = csv.writer(stream)
-        writer.writerow(["t [s]", *heads])
-        writer.writerows(np.column_stack([t, *self.reference.at(t)]).tolist())
-        return save(path, lambda file: file.write(stream.getvalue().encode()), PlanError)
+        return saved(self.plan, path, self.rate_hz)
 
     def blocks(self) -> Iterator[Block]:
         yield from self.plan.blocks()
@@ -198,6 +190,26 @@ def excite(
     return Excitation(plan, problem.expected(x, rate_hz), longer, best_random, information.base.blind, rate_hz)
 
 
+def saved(plan: Plan, path: str | Path, rate_hz: float) -> Path:
+    """Save t, q, v and a of a plan as CSV and return the path; see `Excitation.save`."""
+    path, stream = target(path, _TABLE, PlanError), io.StringIO()
+    t = np.linspace(0.0, plan.duration_s, round(plan.duration_s * rate_hz) + 1)
+    joints = list(zip(plan.joint_names, plan.joint_types, strict=True))
+    units = {"q": "rad", "v": "rad/s", "a": "rad/s²"}
+    heads = [f"{name} {joint} [{of_joint(unit, kind)}]" for name, unit in units.items() for joint, kind in joints]
+    writer = csv.writer(stream)
+    writer.writerow(["t [s]", *heads])
+    writer.writerows(np.column_stack([t, *plan.reference.at(t)]).tolist())
+    return save(path, lambda file: file.write(stream.getvalue().encode()), PlanError)
+
+
+def problem_of(arm: Robot, duration_s: float) -> Problem:
+    """Return the optimisation within 90 % of the limits of the arm's file, for unit noise."""
+    information = Information(arm, base_parameters(arm), np.ones(arm.n), np.ones(arm.n))
+    series = FourierSeries(duration_s, max(5, round(duration_s * _BANDWIDTH_HZ)))
+    return Problem(information, series, *_limits(arm, {}, 0.9))
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -256,7 +268,7 @@ class Problem:
     def random(self, rng: np.random.Generator) -> np.ndarray:
         """Return a random series, as large as the limits allow, with mean positions within 60 % of the range."""
         n = self.information.arm.n
-        x, centre = rng.normal(size=(self.series.size, n)), self._centre(rng)
+        x, centre = rng.normal(size=(self.series.size, n)), self.poses(rng, 1)[0]
         x[0] = 0.0
         largest = np.hstack([np.abs(part).max(axis=0) for part in motion(x, self.basis)])
         room = self.half[: 3 * n] - np.abs(np.append(centre, np.zeros(2 * n)) - self.middle[: 3 * n])
@@ -264,8 +276,8 @@ class Problem:
         x[0] = centre
         return self.within(x, self.basis)  # pyright: ignore[reportReturnType] # rest at the centre is within limits
 
-    def _centre(self, rng: np.random.Generator) -> np.ndarray:
-        """Return random positions, (n,), at which the arm can rest with room to move.
+    def poses(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Return random positions, (count, n), at which the arm can rest with room to move.
 
         Raises:
             PlanError: If none of 1000 is within the limits.
@@ -281,7 +293,7 @@ class Problem:
                 f" {_QUANTITIES[tightest // n]} limit is the tightest, used by {uses[:, tightest].min():.2g} at least;"
                 " widen it"
             )
-        return q[free[0]]
+        return q[np.resize(free, count)]
 
     def within(self, x: np.ndarray, basis: State) -> np.ndarray | None:
         """Return the motion with its amplitude reduced until it is within all limits; None if that does not suffice."""

@@ -24,6 +24,7 @@ from robot_dyn.foundations import Value, adjoint_inverse, hat, needs, read_only
 from robot_dyn.tools.identify.log import LogError
 
 SPREAD = 0.5  # σ: distance from the file that counts as much as one standard error of a base parameter
+_ROUNDING = 1e-12  # least variance of unit parameters, relative to the largest
 MARGIN = 1e-6  # least eigenvalue of P, in units of the link
 _LEAST_M = 0.02  # [m]: least size of a link
 
@@ -105,11 +106,18 @@ def nearest_possible(links: Links, R: np.ndarray, values: np.ndarray, covariance
 def distance(links: Links, R: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return A and b of the objective ‖A x − b‖², with x = θ in units of the sizes, (10 N,)."""
     N, sizes = len(links.names), links.sizes
-    L = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    L = whitening(covariance)
     to_base = np.einsum("rbk,bkj->rbj", R.reshape(len(R), N, 10), links.X) * sizes
     metric = np.asarray(block_diag(*map(_metric, links.theta, sizes))) / SPREAD
     b = np.concatenate([L @ (values - R @ links.rest.ravel()), metric @ (links.theta / sizes).ravel()])
     return np.vstack([L @ to_base.reshape(len(R), -1), metric]), b
+
+
+def whitening(covariance: np.ndarray) -> np.ndarray:
+    """Return L with Lᵀ L = Σ⁻¹; combinations with a variance near rounding get that of rounding."""
+    errors = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(errors, errors))
+    return (vectors / np.sqrt(np.maximum(values, _ROUNDING * values[-1]))).T / errors
 
 
 def nearest_bodies(A: np.ndarray, b: np.ndarray) -> np.ndarray:

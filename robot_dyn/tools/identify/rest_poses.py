@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from robot_dyn import ModelWarning, Robot
-from robot_dyn.foundations import Answer, Block, QueryError, Table, Value, instance, numbers, read_only, rotation, truth
+from robot_dyn.foundations import Answer, Block, QueryError, Table, Value, instance, numbers, read_only, truth
 from robot_dyn.tools.identify.base_parameters import BaseParameters, base_parameters
 
 if TYPE_CHECKING:
@@ -241,11 +241,8 @@ class Gravity(Value):
     @cached_property
     def parameters(self) -> tuple[str, ...]:
         """Names of x."""
-        offsets, tilts = (
-            (f"{name} offset" for name in self.arm.joint_names),
-            (f"tilt about {'xyz'[k]}" for k in self.axes),
-        )
-        return (*self.base.names, *offsets, *tilts)
+        offsets = (f"{name} offset" for name in self.arm.joint_names)
+        return (*self.base.names, *offsets, *(f"tilt about {'xyz'[k]}" for k in self.axes))
 
     @cached_property
     def stated(self) -> np.ndarray:
@@ -270,11 +267,14 @@ class Gravity(Value):
 
     def _gravity(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return g' and its derivatives by the tilt, (3,) and (tilts, 3)."""
-        tilt, g = np.zeros(3), np.array(self.arm.gravity)
-        tilt[list(self.axes)] = x[len(x) - len(self.axes) :]
-        steps = _STEP * np.eye(3)[list(self.axes)]
-        slopes = [(_turned(g, tilt + step) - _turned(g, tilt - step)) / (2 * _STEP) for step in steps]
-        return _turned(g, tilt), np.array(slopes).reshape(-1, 3)
+        from scipy.spatial.transform import Rotation
+
+        axes, g, tilt = list(self.axes), np.array(self.arm.gravity), np.zeros(3)
+        tilt[axes] = x[len(x) - len(axes) :]
+        above, below = (
+            Rotation.from_rotvec(-(tilt + step)).apply(g)[axes] for step in (_STEP * np.eye(3), -_STEP * np.eye(3))
+        )
+        return Rotation.from_rotvec(-tilt).apply(g), (above - below) / (2 * _STEP)
 
     def theta(self, x: np.ndarray) -> np.ndarray:
         """Return inertial parameters with these base parameters; what torques do not show is the file's."""
@@ -299,12 +299,6 @@ class Gravity(Value):
         r, t = len(self.base.columns), len(self.axes)
         change = np.abs(self._gravity(self.stated)[1]).T @ widths[len(widths) - t :]
         return np.einsum("i,mik,k->m", change, np.abs(rows.Y[..., self.base.columns]), widths[:r])
-
-
-def _turned(g: np.ndarray, tilt: np.ndarray) -> np.ndarray:
-    """Return exp(−φ̂) g."""
-    angle = float(np.linalg.norm(tilt))
-    return rotation(tilt / angle, -angle) @ g if angle else g
 
 
 def _fitted(model: Gravity, rows: Rows, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -367,14 +361,13 @@ def _extremes(W: np.ndarray, residuals: np.ndarray, bound: np.ndarray) -> np.nda
 
     p = W.shape[1]
     A, b = np.vstack([W, -W]), np.concatenate([bound + residuals, bound - residuals])
-    ends = np.empty((2, p))
-    for i, (side, sign) in [(i, s) for i in range(p) for s in ((0, 1.0), (1, -1.0))]:
-        found = linprog(sign * np.eye(p)[i], A_ub=A, b_ub=b, bounds=(None, None), method="highs")
-        if found.status == 2:
-            needed = linprog(np.eye(p + 1)[p], A_ub=np.column_stack([A, -np.tile(bound, 2)]),
-                             b_ub=b - np.tile(bound, 2), bounds=(None, None), method="highs").x[p]  # fmt: skip
-            raise QueryError(
-                f"no parameters explain the poses with this friction: it must be {needed:.3g} times as large"
-            )
-        ends[side, i] = sign * found.fun if found.status == 0 else -sign * np.inf
-    return ends
+    options = {"bounds": (None, None), "method": "highs"}
+    column = np.tile(bound, 2)[:, None]  # of s in |r − W d| ≤ s bound
+    scaled = linprog(np.eye(p + 1)[p], A_ub=np.hstack([A, -column]), b_ub=b - column[:, 0], **options)
+    if scaled.status != 0 or scaled.fun > 1 + _ZERO:
+        factor = f"it must be {scaled.fun:.3g} times as large" if scaled.status == 0 else "give noise= too"
+        raise QueryError(f"no parameters explain the poses with this friction: {factor}")
+    ends = [[linprog(sign * e, A_ub=A, b_ub=b, **options) for e in np.eye(p)] for sign in (1.0, -1.0)]
+    return np.array(
+        [[sign * (x.fun if x.status == 0 else -np.inf) for x in row] for sign, row in zip((1, -1), ends, strict=True)]
+    )

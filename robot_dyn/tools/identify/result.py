@@ -175,6 +175,8 @@ class Identification(Answer, Value):
         yield Table(("", "cause", "explains", "BIC"), tuple(rows), digits=4)
         if len(first) > 1:
             yield f"the log does not distinguish the first {len(first)}"
+        if self.verdict.experiment is not None:
+            yield self.verdict.experiment.text
 
     def save(self, path: str | Path) -> Path:
         """Save the report (.html), the corrected URDF (.urdf) or all data (.json); return the path.

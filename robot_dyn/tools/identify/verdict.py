@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, final
 
@@ -20,10 +20,12 @@ import numpy as np
 from robot_dyn import Robot
 from robot_dyn.foundations import Value, hat, read_only, reported
 from robot_dyn.queries import of_joint
+from robot_dyn.tools.identify.discrimination import Experiment, experiment_of
 from robot_dyn.tools.identify.physical import Links
 
 if TYPE_CHECKING:
     from robot_dyn.tools.identify.estimation import Estimate, Friction, Model
+    from robot_dyn.tools.identify.excitation import State
 
     Columns = Callable[..., np.ndarray]
 
@@ -63,10 +65,15 @@ class Cause(Value):
         read_only(self)
 
     @property
+    def name(self) -> str:
+        """Kind and place."""
+        return f"{self.kind} of {self.where}" if self.where else self.kind
+
+    @property
     def text(self) -> str:
         """The cause with its values and intervals."""
         values = ", ".join(f"{x:+.3g} ± {w:.2g}" for x, w in zip(self.values, self.half_widths, strict=True))
-        return f"{f'{self.kind} of {self.where}' if self.where else self.kind}: {values} {self.unit}"
+        return f"{self.name}: {values} {self.unit}"
 
 
 @final
@@ -77,10 +84,12 @@ class Verdict(Value):
     Attributes:
         ratios: Rms of the residuals of the file in units of the noise, (n,).
         causes: All causes, the most probable first.
+        experiment: Poses and a motion that would tell the first causes apart; None if there is one or none.
     """
 
     ratios: np.ndarray
     causes: tuple[Cause, ...]
+    experiment: Experiment | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -118,12 +127,13 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: Friction |
     if friction is not None:
         own[r:-1] = friction.values
     shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
-    candidates = []
+    candidates, shown = [], {}
     for *name, columns in _candidates(arm, links, model, rows.Y, own, friction):
         C = columns(*state)
         C = (C if len(C) == len(rows.tau) else signals.second(C)).reshape(rows.tau.size, -1)
         seen = (np.abs(C).max(axis=0) > _NOTHING) | (name[0] == "load")  # whose first coefficient is its mass
         candidates.append((*name, C[:, seen]))
+        shown[tuple(name[:2])] = seen
     y, used = (shifted - rows.Y @ own).ravel(), rows.used.reshape(-1)
     noise = _noise(
         y, np.column_stack([rows.Y.reshape(len(y), -1), *(C for *_, C in candidates)]), rows.used, found.fit.rms
@@ -135,7 +145,7 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: Friction |
     rest = y - _fitted(nuisance, y)[0]
     start = float(rest @ rest)
     ratios = np.sqrt((rest.reshape(-1, n) ** 2).sum(axis=0) / np.maximum(rows.used.sum(axis=0), 1))
-    causes = []
+    causes, estimates = [], {}
     for kind, where, unit, factor, columns in candidates:
         if not columns.shape[1]:  # for example gravity along the axes of all joints
             continue
@@ -146,11 +156,24 @@ def verdict_of(model: Model, links: Links, found: Estimate, friction: Friction |
         if kind == "load" and x[0] <= spread[0]:  # without mass, it stands for another cause
             continue
         part = (start - chi2) / max(start - full, 1e-300)
+        estimates[kind, where] = x[:k]
         values, widths = (x[:k] * factor)[:_SHOWN], (spread * factor)[:_SHOWN]
         causes.append((chi2, k * np.log(count), partial(Cause, kind, where, values, widths, unit, part)))
     dispersion = max(1.0, min((chi2 for chi2, *_ in causes), default=0.0) / count)
     ranked = (cause(float(chi2 / dispersion + penalty)) for chi2, penalty, cause in causes)
-    return Verdict(ratios, tuple(sorted(ranked, key=lambda cause: cause.bic)))
+    verdict = Verdict(ratios, tuple(sorted(ranked, key=lambda cause: cause.bic)))
+    if len(verdict.first) < 2:
+        return verdict
+
+    def rivals(state: State, step_s: float) -> tuple[np.ndarray, list[np.ndarray]]:
+        Y = model.columns(*state)
+        Y = np.concatenate([Y, np.gradient(Y @ own[:-1], step_s, axis=0)[..., None]], axis=2)
+        columns = {tuple(name[:2]): columns for *name, columns in _candidates(arm, links, model, Y, own, friction)}
+        unknown = Y[..., r : r + 2 * n] if friction is None else Y[..., :0]
+        return unknown, [columns[x.kind, x.where](*state)[..., shown[x.kind, x.where]] for x in verdict.first]
+
+    named = {x.name: estimates[x.kind, x.where] for x in verdict.first}
+    return replace(verdict, experiment=experiment_of(model.arm, named, rivals, noise * np.sqrt(dispersion)))
 
 
 def _noise(y: np.ndarray, columns: np.ndarray, used: np.ndarray, scale: np.ndarray) -> np.ndarray:

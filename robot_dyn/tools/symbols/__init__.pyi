@@ -11,4 +11,4 @@ from robot_dyn.tools.symbols.latex import align as align
 from robot_dyn.tools.symbols.letters import Lettering as Lettering
 from robot_dyn.tools.symbols.letters import body_numbers as body_numbers
 from robot_dyn.tools.symbols.letters import readable as readable
-from robot_dyn.tools.symbols.polynomials import Numbers as Numbers
+from robot_dyn.tools.symbols.polynomials import Component as Component

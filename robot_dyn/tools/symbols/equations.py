@@ -11,17 +11,18 @@ import numpy as np
 
 from robot_dyn import Robot
 from robot_dyn.codegen.trace.base_parameters import regrouped
-from robot_dyn.foundations import QueryError, first_moment, needs, shown
+from robot_dyn.foundations import FLOAT64, QueryError, first_moment, hat, needs, shown
 from robot_dyn.lagrange import FORMULAS, Linkage, Pose, linkage_of, tree_of
 from robot_dyn.tools.symbols.fourier import expression, shortest
 from robot_dyn.tools.symbols.latex import align
 from robot_dyn.tools.symbols.letters import MOMENTS, Lettering, Meaning, RoundedAngle, body_numbers, readable
-from robot_dyn.tools.symbols.polynomials import Letter, Numbers, Polynomials, Turn
+from robot_dyn.tools.symbols.polynomials import Letter, Polynomials, Turn
 
 if TYPE_CHECKING:
     import sympy as sp
 
 READABLE = 600  # terms of M and N: some four pages
+BASE = ("M", "MX", "MY", "MZ", *map(str.upper, MOMENTS))  # letters of the base parameters of a body
 SMALL = 1e-12  # relative to the largest parameter of a kind: rounding of the regrouping
 
 
@@ -89,12 +90,12 @@ class SymbolicEquations:
         import sympy as sp
 
         q = np.random.default_rng(0).uniform(-2.0, 2.0, (20, self.n))
+        arguments = sp.symbols([*(f"q{k + 1}" for k in range(self.n)), *self.letters], real=True)
         values = [meaning.value for meaning in self.letters.values()]
         result = {}
         for name, matrix, exact in (("M", self.M, self.arm.M(q)), ("N", self.N, self.arm.N(q)[..., None])):
-            symbols = [[sp.Symbol(f"q{k + 1}", real=True) for k in range(self.n)], *_symbols(self.letters)]
-            function = sp.lambdify(symbols, matrix, cse=True)
-            ours = np.array([function(row, *values) for row in q], dtype=float)
+            function = sp.lambdify(arguments, matrix, cse=True)
+            ours = np.array([function(*row, *values) for row in q], dtype=float)
             result[name] = float(np.abs(ours - exact).max() / (np.abs(exact).max() or 1.0))
         return result
 
@@ -143,7 +144,8 @@ class SymbolicEquations:
     def _matrix(self, name: str) -> sp.Matrix:
         import sympy as sp
 
-        names = next(x for x in self.polynomials["M"].flat if not isinstance(x, int)).ring.names
+        ring = self.polynomials["M"].flat[0].ring
+        names = tuple(part if (part := _part(x)) in self.letters else x for x in ring.names)
         entries = self._terms[name]
         rows = entries.reshape(self.n, -1)
         return sp.Matrix([[expression(terms, names, self.groups) for terms in row] for row in rows])
@@ -172,10 +174,8 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     tree = readable(tree_of(arm.description, arm.edits))
     lettering = Lettering(named=letters == "file", with_g=letters is not None)
     lettered = lettering.tree(tree, arm.joint_names)
-    meanings = dict(lettering.letters)
-    inertias = _base_inertias(arm) if letters == "base" else {}
-    for values, _ in inertias.values():
-        meanings |= values
+    parameters = _base_parameters(arm) if letters == "base" else {}
+    meanings = dict(lettering.letters) | parameters
     coordinates = tuple(f"q{k + 1}" for k in range(len(arm.joint_names)))
     rates = tuple(f"v{k + 1}" for k in range(len(arm.joint_names)))
     scalars = tuple(name for name in meanings if name not in lettering.angles)
@@ -185,10 +185,12 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     ring = Polynomials((*scalars, *rates, *sliding), (*turning, *lettering.angles))
     linkage = linkage_of(lettered, arm.joint_names, ring)
     if letters == "base":
-        links = {
-            name: (i, Pose(np.eye(3, dtype=object), np.zeros(3, dtype=object)), ring.array(inertias[name][1]))
-            for i, name in enumerate(body.joint for body in linkage.bodies)
-        }
+        numbers, identity = (
+            body_numbers(tree, arm.joint_names),
+            Pose(np.eye(3, dtype=object), np.zeros(3, dtype=object)),
+        )
+        names = [body.joint for body in linkage.bodies]
+        links = {name: (i, identity, _inertia(parameters, numbers[name], ring)) for i, name in enumerate(names)}
         linkage = replace(linkage, links=links)
     q = np.empty(len(coordinates), dtype=object)
     q[:] = [
@@ -200,13 +202,17 @@ def symbols(arm: Robot, letters: Literal["file", "base"] | None = "file") -> Sym
     try:
         results: dict[str, Any] = {"M": FORMULAS["M"](at), "C": FORMULAS["C"](at, v), "N": FORMULAS["N"](at)}
     except (OverflowError, SystemError) as error:
-        cause: BaseException | None = error
-        while isinstance(cause, SystemError):  # products of NumPy's objects raise one from the error of an operator
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__:  # NumPy raises one from the error of an operator
             cause = cause.__cause__
-        if cause is None:
+        if not isinstance(cause, OverflowError):
             raise
         raise _unreadable(f"an intermediate result has {cause}", letters) from None
-    return _named(SymbolicEquations(arm, letters, meanings, tuple(lettering.rounded), results, _parallel(linkage)))
+    results = {name: ring.array(entries) for name, entries in results.items()}  # zeros of trees are integers of NumPy
+    for entries in results.values():
+        entries.setflags(write=False)
+    used = _occurring(meanings, results)
+    return SymbolicEquations(arm, letters, used, tuple(lettering.rounded), results, _parallel(linkage))
 
 
 def _unreadable(size: str, letters: str | None) -> QueryError:
@@ -218,60 +224,47 @@ def _unreadable(size: str, letters: str | None) -> QueryError:
     )
 
 
-def _named(equations: SymbolicEquations) -> SymbolicEquations:
-    """Return the equations without letters that do not occur, and with I2 where one moment of a part occurs."""
-    ring = next(x for x in equations.polynomials["M"].flat if not isinstance(x, int)).ring
-    polynomials = [x for entries in equations.polynomials.values() for x in entries.flat if not isinstance(x, int)]
-    degrees = np.max([x.value.degrees() for x in polynomials], axis=0)
-    used = {name for name, degree in zip(ring.names, degrees, strict=True) if degree}
-    used |= {name[2:] for name in used if name[:2] in ("s_", "c_")}
-    letters = {name: meaning for name, meaning in equations.letters.items() if name in used}
-    moments = [name for name in letters if name[0] == "I" and name.partition("_")[2] in MOMENTS]
-    parts = [name.partition("_")[0] for name in moments]
-    names = {name: part for name, part in zip(moments, parts, strict=True) if parts.count(part) == 1}
-    renamed = Polynomials(tuple(str(names.get(name, name)) for name in ring.letters), ring.angles)
-    converted = {
-        key: np.vectorize(renamed.of, otypes=[object])(entries) for key, entries in equations.polynomials.items()
-    }
-    for entries in converted.values():
-        entries.setflags(write=False)
-    letters = {names.get(name, name): meaning for name, meaning in letters.items()}
-    return replace(equations, letters=letters, polynomials=converted)
+def _occurring(letters: Mapping[str, Meaning], polynomials: Mapping[str, np.ndarray]) -> dict[str, Meaning]:
+    """Return the letters that occur, with I2 where one moment of a part does."""
+    values = [x for entries in polynomials.values() for x in entries.flat]
+    occurring = {*values[0].ring.names}.difference(set.intersection(*(set(x.value.unused_gens()) for x in values)))
+    used = {name: meaning for name, meaning in letters.items() if occurring & {name, f"s_{name}", f"c_{name}"}}
+    parts = [_part(name) for name in used]
+    return {part if parts.count(part) == 1 else name: used[name] for name, part in zip(used, parts, strict=True)}
 
 
-def _base_inertias(arm: Robot) -> dict[str, tuple[dict[str, Meaning], list[list[Any]]]]:
-    """Return the letters of each body's base parameters, and its 𝓜 in them, by joint.
+def _part(name: str) -> str:
+    """Return I2 of I2_zz, and other letters as they are."""
+    return name.partition("_")[0] if name.startswith("I") else name
+
+
+def _base_parameters(arm: Robot) -> dict[str, Meaning]:
+    """Return the base parameters of all bodies, by their letters.
 
     The letters follow Gautier and Khalil (1990): M mass, MX first moment, XX second moment in the joint's frame.
     """
-    lettering = Lettering(named=False)  # the same angles as in the formulas, in floats
-    tree = lettering.tree(readable(tree_of(arm.description, arm.edits)), arm.joint_names)
-    numbers = regrouped(linkage_of(tree, arm.joint_names, Numbers({k: m.value for k, m in lettering.letters.items()})))
+    # the same angles as in the formulas, in floats
+    tree = Lettering(named=False).tree(readable(tree_of(arm.description, arm.edits)), arm.joint_names)
+    numbers = regrouped(linkage_of(tree, arm.joint_names, FLOAT64))
     inertias = np.array(numbers.inertias, dtype=float)
     largest = np.abs(inertias).max(axis=0)
     small = SMALL * np.array([[largest[:3, :3].max()] * 3 + [largest[:3, 3:].max()] * 3] * 3
                              + [[largest[:3, 3:].max()] * 3 + [largest[3:, 3:].max()] * 3] * 3)  # fmt: skip
-    result = {}
+    result: dict[str, Meaning] = {}
     indices = body_numbers(tree, arm.joint_names)
     for body, inertia in zip(numbers.bodies, np.where(np.abs(inertias) > small, inertias, 0.0), strict=True):
-        k = indices[body.joint]
-        values = {f"M{k}": inertia[0, 0]}
-        values |= dict(zip((f"MX{k}", f"MY{k}", f"MZ{k}"), first_moment(inertia), strict=True))
-        pairs = dict(zip(MOMENTS, zip(*np.triu_indices(3), strict=True), strict=True))
-        values |= {f"{name.upper()}{k}": inertia[3 + i, 3 + j] for name, (i, j) in pairs.items()}
-        symbols = {name: Letter(name) if value else 0 for name, value in values.items()}
-        M, X, Y, Z, XX, XY, XZ, YY, YZ, ZZ = symbols.values()
-        minus = {
-            name: replace(x, negative=True) if isinstance(x, Letter) else 0
-            for name, x in zip("XYZ", (X, Y, Z), strict=True)
-        }
-        rows = [
-            [M, 0, 0, 0, Z, minus["Y"]], [0, M, 0, minus["Z"], 0, X], [0, 0, M, Y, minus["X"], 0],
-            [0, minus["Z"], Y, XX, XY, XZ], [Z, 0, minus["X"], XY, YY, YZ], [minus["Y"], X, 0, XZ, YZ, ZZ],
-        ]  # fmt: skip
-        where = f"base parameter of joint {body.joint!r}"
-        result[body.joint] = {name: Meaning(float(x), where) for name, x in values.items() if x}, rows
+        values = (inertia[0, 0], *first_moment(inertia), *inertia[3:, 3:][np.triu_indices(3)])
+        where, k = f"base parameter of joint {body.joint!r}", indices[body.joint]
+        result |= {f"{name}{k}": Meaning(float(x), where) for name, x in zip(BASE, values, strict=True) if x}
     return result
+
+
+def _inertia(parameters: Mapping[str, Meaning], k: int, ring: Polynomials) -> np.ndarray:
+    """Return 𝓜 of body k in the letters of its base parameters."""
+    names = [f"{name}{k}" for name in BASE]
+    M, X, Y, Z, XX, XY, XZ, YY, YZ, ZZ = ring.array([Letter(name) if name in parameters else 0 for name in names])
+    c, J = hat(np.array([X, Y, Z])), np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+    return np.block([[M * np.eye(3, dtype=object), -c], [c, J]])
 
 
 def _parallel(linkage: Linkage) -> tuple[tuple[str, ...], ...]:
@@ -291,9 +284,3 @@ def _parallel(linkage: Linkage) -> tuple[tuple[str, ...], ...]:
         if not any(set(names) & set(group) for group in groups):  # an angle is in one group, also where arms branch
             groups.append(names)
     return tuple(groups)
-
-
-def _symbols(names: Mapping[str, Meaning]) -> list[Any]:
-    import sympy as sp
-
-    return [sp.Symbol(name, real=True) for name in names]

@@ -9,7 +9,7 @@ from typing import Any
 WIDTH = 72  # of a line in characters, indices included: 345 pt, the column of `article`
 
 
-def align(entries: Iterable[tuple[str, Any]]) -> str:
+def align(entries: Iterable[tuple[str, object]]) -> str:
     """Return an align* environment of amsmath with an equation for each pair of a left and a right side.
 
     A sum that is wider than a line is broken before a term; a product with a sum that is wider is multiplied out first.
@@ -44,16 +44,15 @@ def _terms(x: Any) -> Iterator[str]:
 def _printed(x: Any) -> str:
     import sympy as sp
 
-    names = {symbol: _name(symbol.name) for symbol in x.free_symbols if _name(symbol.name)}
-    return sp.latex(x, symbol_names=names)
+    return sp.latex(x, symbol_names={symbol: _letter(symbol.name) for symbol in x.free_symbols})
 
 
-def _name(name: str) -> str:
-    """Return the LaTeX of a rate, or of a letter such as MX2, whose M X would be a product; else nothing."""
-    kind, index = re.fullmatch(r"([A-Za-z]*)(.*)", name).groups()  # pyright: ignore[reportOptionalMemberAccess]
-    if kind == "v":
-        return rf"\dot{{q}}_{{{index}}}"
-    return rf"\mathit{{{kind}}}_{{{index}}}" if len(kind) == 2 and kind.isupper() else ""
+def _letter(name: str) -> str:
+    """Return the LaTeX of a letter: of v1 a rate, of I3b_xx the index 3b,xx, of MX2 one letter and no product M X."""
+    kind, body, axis = re.fullmatch(r"([A-Za-z]+?)(\d\w*?)?(?:_(\w+))?", name).groups()  # pyright: ignore[reportOptionalMemberAccess]
+    head = {"v": r"\dot{q}", "alpha": r"\alpha"}.get(kind, kind if len(kind) == 1 else rf"\mathit{{{kind}}}")
+    index = ",".join(filter(None, (body, axis)))
+    return f"{head}_{{{index}}}" if index else head
 
 
 def _width(latex: str) -> int:

@@ -139,8 +139,9 @@ class Lettering:
         values = [_value(x) for x in gravity]
         if not self.with_g or sum(map(bool, values)) != 1:
             return self._vector("g", "", gravity, "gravity")
-        self.letters["g"] = Meaning(float(sum(map(abs, values))), "gravity")
-        return tuple(replace(Letter("g"), negative=x < 0) if x else "0" for x in values)
+        g = float(sum(map(abs, values)))
+        self.letters["g"] = Meaning(g, "gravity")
+        return tuple(Letter("g", g, 1 if x > 0 else -1) if x else "0" for x in values)
 
     def _label(self, kind: str, body: int) -> str:
         """Return the number of a body; of further parts on it with b, c, …."""
@@ -161,7 +162,7 @@ class Lettering:
         if not exact or not self.named:
             return exact
         self.letters[name] = Meaning(float(exact), where)
-        return Letter(name)
+        return Letter(name, float(exact))
 
     def _angle(self, literal: Any, where: str) -> Angle:
         angle = float(literal)
@@ -173,7 +174,7 @@ class Lettering:
         name = f"alpha{len(self.angles) + 1}"
         self.angles.append(name)
         self.letters[name] = Meaning(angle, where)
-        return Angle(name=name)
+        return Angle(name=name, value=angle)
 
     def _rpy(self, angles: Any, where: str) -> Any:
         names = zip(("roll", "pitch", "yaw"), angles, strict=True)

@@ -10,6 +10,8 @@ Algorithms, 4th ed., 2015, ch. 2 §9]
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,7 +23,7 @@ import numpy as np
 from robot_dyn.foundations import Arithmetic, Numeral
 
 if TYPE_CHECKING:
-    from flint import fmpq, fmpq_mpoly
+    from flint import fmpq_mpoly
 
 MAX_TERMS = 2000  # of one polynomial; those of the arms that are printed have 150 at most
 ROOTS = {"sqrt2": 2, "sqrt3": 3}
@@ -30,19 +32,27 @@ ROOTS = {"sqrt2": 2, "sqrt3": 3}
 @final
 @dataclass(frozen=True)
 class Letter:
-    """A letter for one number, by its name, or the negative of that number."""
+    """A letter for a number: its name, its value, and -1 if it stands for the negative of that number."""
 
     name: str
-    negative: bool = False
+    value: float = 0.0
+    sign: int = 1
+
+    def __float__(self) -> float:
+        return self.sign * self.value
 
 
 @final
 @dataclass(frozen=True)
 class Angle:
-    """An angle: `twelfths` of π, or a letter if `name` is not empty."""
+    """An angle: `twelfths` of π, or a letter with a value if `name` is not empty."""
 
     twelfths: int = 0
     name: str = ""
+    value: float = 0.0
+
+    def __float__(self) -> float:
+        return self.value if self.name else self.twelfths * math.pi / 12
 
 
 @final
@@ -54,6 +64,14 @@ class Component:
     elevation: Angle
     k: int
 
+    def _of(self, azimuth: Any, elevation: Any) -> Any:
+        """Return the component from the angles as numbers of an arithmetic."""
+        across = np.cos(elevation)
+        return (across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation))[self.k]
+
+    def __float__(self) -> float:
+        return float(self._of(float(self.azimuth), float(self.elevation)))
+
 
 @final
 class Polynomial:
@@ -64,43 +82,31 @@ class Polynomial:
     def __init__(self, ring: Polynomials, value: fmpq_mpoly) -> None:
         self.ring, self.value = ring, value
 
-    def _with(self, value: fmpq_mpoly) -> Polynomial:
-        return Polynomial(self.ring, value)
-
-    def _operand(self, other: object) -> Any:
-        if type(other) is Polynomial:
-            return other.value
-        if type(other) is int:
-            return other  # flint has operators of polynomials and integers
-        return self.ring.constant(other) if isinstance(other, int | float | Fraction | np.number) else None
+    def _by(self, operation: Callable[[Any, Any], Any], other: object) -> Polynomial:
+        value = other.value if isinstance(other, Polynomial) else other
+        if not isinstance(value, type(self.value) | int):
+            return NotImplemented
+        return Polynomial(self.ring, operation(self.value, value))
 
     def __add__(self, other: object) -> Polynomial:
-        y = self._operand(other)
-        return NotImplemented if y is None else self._with(self.value + y)
+        return self._by(operator.add, other)
 
     def __sub__(self, other: object) -> Polynomial:
-        y = self._operand(other)
-        return NotImplemented if y is None else self._with(self.value - y)
+        return self._by(operator.sub, other)
 
     def __rsub__(self, other: object) -> Polynomial:
         return -self + other
 
     def __mul__(self, other: object) -> Polynomial:
-        if type(other) is Polynomial:
-            if not self.value or not other.value:
-                return self if not self.value else other
-            return self._with(self.ring.reduced(self.value * other.value))
-        y = self._operand(other)
-        return NotImplemented if y is None else self._with(self.value * y)
+        return self._by(self.ring.product, other)
 
     __radd__, __rmul__ = __add__, __mul__
 
     def __truediv__(self, other: object) -> Polynomial:
-        y = self._operand(other)
-        return NotImplemented if y is None else self._with(self.value / y)
+        return self._by(operator.truediv, other)
 
     def __neg__(self) -> Polynomial:
-        return self._with(-self.value)
+        return Polynomial(self.ring, -self.value)
 
     def __abs__(self) -> Polynomial:
         if not self.value.is_constant():
@@ -111,8 +117,7 @@ class Polynomial:
         return bool(self.value)
 
     def __eq__(self, other: object) -> bool:
-        y = self._operand(other)
-        return NotImplemented if y is None else bool(self.value == y)
+        return bool(self.value == (other.value if isinstance(other, Polynomial) else other))
 
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
@@ -128,7 +133,7 @@ class Polynomial:
 
     def derivative(self, name: str) -> Polynomial:
         """Return the partial derivative by a generator."""
-        return self._with(self.value.derivative(self.ring.names.index(name)))
+        return Polynomial(self.ring, self.value.derivative(name))
 
 
 @final
@@ -206,8 +211,9 @@ class Polynomials(Arithmetic):
         circles = [(at(f"s_{name}"), x[f"s_{name}"] ** 2 + x[f"c_{name}"] ** 2 - 1) for name in self.angles]
         return circles + [(at(name), x[name] ** 2 - square) for name, square in ROOTS.items()]
 
-    def reduced(self, value: fmpq_mpoly) -> fmpq_mpoly:
-        """Return the remainder by the relations; raise OverflowError for a polynomial of too many terms."""
+    def product(self, x: fmpq_mpoly, y: fmpq_mpoly | int) -> fmpq_mpoly:
+        """Return the remainder of x y by the relations; raise OverflowError for a polynomial of too many terms."""
+        value = x * y
         if len(value) > MAX_TERMS:
             raise OverflowError(f"more than {MAX_TERMS} terms")
         if value:
@@ -217,40 +223,24 @@ class Polynomials(Arithmetic):
                     value = value % relation
         return value
 
-    def constant(self, x: str | SupportsFloat) -> fmpq:
-        """Return a number as a rational of flint."""
-        from flint import fmpq
-
-        exact = Fraction(x) if isinstance(x, str | int | Fraction) else Fraction(float(x))
-        return fmpq(exact.numerator, exact.denominator)
-
     def generator(self, name: str) -> Polynomial:
         """Return a generator by its name."""
         return Polynomial(self, self._generators[name])
 
     def number(self, literal: Numeral | Letter | Angle | Component | Polynomial | Turn) -> Polynomial | Turn:  # pyright: ignore[reportIncompatibleMethodOverride]
         if isinstance(literal, Letter):
-            letter = self.generator(literal.name)
-            return -letter if literal.negative else letter
+            return literal.sign * self.generator(literal.name)
         if isinstance(literal, Angle):
             return self._turn(literal)
         if isinstance(literal, Component):
-            azimuth, elevation = self._turn(literal.azimuth), self._turn(literal.elevation)
-            return (elevation.c * azimuth.c, elevation.c * azimuth.s, elevation.s)[literal.k]
-        if isinstance(literal, Polynomial | Turn):
-            return literal
-        return self._constant(literal)
+            return literal._of(self._turn(literal.azimuth), self._turn(literal.elevation))
+        return literal if isinstance(literal, Polynomial | Turn) else self._constant(literal)
 
-    def of(self, x: Polynomial | int) -> Polynomial:
-        """Return a polynomial of a ring with as many generators, whose letters have other names; or a number."""
-        return (
-            Polynomial(self, self._context.from_dict(x.value.to_dict()))
-            if isinstance(x, Polynomial)
-            else self._constant(x)
-        )
+    def _constant(self, x: str | SupportsFloat) -> Polynomial:
+        from flint import fmpq
 
-    def _constant(self, x: Numeral) -> Polynomial:
-        return Polynomial(self, self._context.constant(self.constant(x)))
+        exact = Fraction(x) if isinstance(x, str | int | Fraction) else Fraction(float(x))
+        return Polynomial(self, self._context.constant(fmpq(exact.numerator, exact.denominator)))
 
     def _turn(self, angle: Angle) -> Turn:
         if angle.name:
@@ -276,43 +266,6 @@ class Polynomials(Arithmetic):
 
     def finite(self, x: np.ndarray) -> np.ndarray:
         return np.ones(x.shape, dtype=bool)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Numbers(Arithmetic):
-    """Floats, with angles at their multiple of π/12 or at the value of their letter.
-
-    Attributes:
-        values: Values of the letters.
-    """
-
-    values: dict[str, float]
-
-    @property
-    def dtype(self) -> np.dtype:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Type of entries: float64."""
-        return np.dtype(np.float64)
-
-    def number(self, literal: Numeral | Letter | Angle | Component) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
-        if isinstance(literal, Letter):
-            return self.values[literal.name] * (-1 if literal.negative else 1)
-        if isinstance(literal, Angle):
-            return self.values[literal.name] if literal.name else literal.twelfths * math.pi / 12
-        if isinstance(literal, Component):
-            azimuth, elevation = self.number(literal.azimuth), self.number(literal.elevation)
-            across = math.cos(elevation)
-            return (across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation))[literal.k]
-        return float(literal)
-
-    def scope(self) -> AbstractContextManager[None]:
-        return nullcontext()
-
-    def asarray(self, values: object) -> np.ndarray:
-        return self.array(values)
-
-    def finite(self, x: np.ndarray) -> np.ndarray:
-        return np.isfinite(x)
 
 
 def twelfths_of(angle: float, tolerance: float) -> int | None:

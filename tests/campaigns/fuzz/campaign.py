@@ -21,7 +21,7 @@ from robot_dyn.foundations import RobotDynWarning
 
 FUZZERS = ("urdf", "run_files", "scenes", "arguments", "queries", "cache")
 CASES = int(os.environ.get("ROBOT_DYN_FUZZ_CASES", "60"))  # of each of six fuzzers in the suite
-MORE = 300  # in `make test-long`
+MORE = 120  # in `make test-long`
 MANY = 4000  # in `make stress`
 MEMORY_BYTES = 4 * 2**30  # of a campaign by hand
 

@@ -22,8 +22,20 @@ SOME = {  # one of each family
     "planar_2r, smooth, scenes 0 to 2", "relay", "ur5's elbow 0.1 m beyond", "planar_2r, PID in saturation",
     "double pendulum, RK4", "planar_2r", "double_pendulum", "turning and sliding", "stopped",
 }  # fmt: skip
+SLOW = {
+    "panda, smooth, scenes 0 to 1", "planar_2r, set-valued, scenes 0 to 2", "panda, set-valued, scenes 1 to 3",
+    "double pendulum, GaussLegendre6, 20000 short steps", "Panda, RK4", "Lyapunov time of the double pendulum",
+}  # fmt: skip
+
+
+def _marks(case: Case) -> list[pytest.MarkDecorator]:
+    if case.name in SOME:
+        return []
+    return [pytest.mark.stress if case.name in SLOW else pytest.mark.long]
+
+
 ALL = [
-    pytest.param(case, id=f"{name}: {case.name}", marks=[] if case.name in SOME else [pytest.mark.long])
+    pytest.param(case, id=f"{name}: {case.name}", marks=_marks(case))
     for name, family in FAMILIES.items()
     for case in family.CASES
     if not case.full

@@ -17,7 +17,7 @@ from robot_dyn.tools.doctor import Severity, check_urdf, checked
 from tests.broken_files import BROKEN, LINKS, SOUND
 from tests.command import run
 from tests.drawings import stl
-from tests.long import long
+from tests.long import long, stress
 from tests.promised import check_document
 
 Q = np.array([0.3, -0.7, 1.1])
@@ -286,7 +286,7 @@ def test_the_limits_of_a_joint_have_one_unit_and_are_repaired_together(
     np.testing.assert_allclose([robot.lower[1], robot.upper[1]], repaired, rtol=1e-15)
 
 
-@pytest.mark.parametrize(("units", "more"), [(True, 10), *long([(False, 40), (True, 40)])])
+@pytest.mark.parametrize(("units", "more"), [(True, 10), *long([(False, 10)]), *stress([(False, 40), (True, 40)])])
 def test_a_repaired_file_is_repaired_for_good(units: bool, more: int) -> None:
     """Each way to break the file, and pairs of them: repaired again no byte changes, and left is what is found."""
     rng, names = np.random.default_rng(3), [*BROKEN]

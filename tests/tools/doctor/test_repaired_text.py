@@ -10,7 +10,7 @@ import pytest
 from robot_dyn.description import catalog
 from robot_dyn.shapes import Masses
 from robot_dyn.tools.doctor import checked
-from tests.long import long
+from tests.long import third
 
 FILE = """<?xml version="1.0"?>
 <!-- quotes: > " ' -->
@@ -81,7 +81,7 @@ def small(count: int) -> list[str]:
     return sorted(named, key=lambda name: named[name])[:count]
 
 
-@pytest.mark.parametrize("name", [*small(4), *long(small(36)[4:])])
+@pytest.mark.parametrize("name", [*small(4), *third(small(36)[4:])])
 def test_of_a_file_of_the_catalog_only_lines_with_repairs_change(name: str) -> None:
     path = catalog.find(name)
     text = path.read_bytes().replace(b"package://", b"package://absent/")  # without its meshes, which take minutes

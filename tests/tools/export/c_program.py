@@ -50,7 +50,8 @@ def library(source: CSource, folder: Path, target: Target = HOST, level: str = "
     source.write(folder)
     compiled = folder / "dynamics.o"
     flags = [*STRICT, *(FLOAT if source.dtype == "float32" else [])]
-    call(target.compiler, *flags, level, "-c", folder / f"{source.name}_dynamics.c", "-o", compiled)
+    (code,) = (name for name in source.files if name.endswith(("_dynamics.c", "_controller.c")))
+    call(target.compiler, *flags, level, "-c", folder / code, "-o", compiled)
     return compiled
 
 

@@ -22,9 +22,9 @@ from robot_dyn.foundations import ExportError, QueryError, RobotDynWarning
 from robot_dyn.tools.export import CSource, c_source
 from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
-from robot_dyn.tools.export.rounding import UNITS, States, bound, box_of
+from robot_dyn.tools.export.rounding import UNITS, StatesOfArm, bound, box_of
 from tests.command import ROOT, run
-from tests.long import long
+from tests.long import third
 from tests.promised import check_document
 from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
@@ -71,7 +71,7 @@ class Written:
 
 
 @needs_cc
-@pytest.mark.parametrize("name", [*QUICK, *long(OTHERS)])
+@pytest.mark.parametrize("name", [*QUICK, *third(OTHERS)])
 def test_robots_of_the_catalog_pass_their_self_test(name: str, tmp_path: Path) -> None:
     """Built with all warnings as errors. The tolerance is 16 times the largest difference at 10 000 states."""
     try:
@@ -88,7 +88,7 @@ def test_robots_of_the_catalog_pass_their_self_test(name: str, tmp_path: Path) -
 
 
 @needs_cc
-@pytest.mark.parametrize("name", ["pendulum", *long(sorted(set(QUICK) - SLOW_IN_FLOAT - {"pendulum"}))])
+@pytest.mark.parametrize("name", ["pendulum", *third(sorted(set(QUICK) - SLOW_IN_FLOAT - {"pendulum"}))])
 def test_robots_in_float_have_no_operation_in_double(name: str, tmp_path: Path) -> None:
     """`library` makes promotions to double errors. Some hundred operations of 6e-8 add up to less than 1e-6."""
     source = c_source(loaded(name), dtype="float32")
@@ -236,7 +236,7 @@ def test_the_bound_holds_at_random_states(name: str, quantity: str) -> None:
     program = program_of(traced)
     for dtype, unit in UNITS.items():
         limits = bound(program, [box_of(equations, "q")], unit)
-        q = States(equations, dtype, 100).inputs["q"]
+        q = StatesOfArm(dtype, 100, equations).inputs["q"]
         errors = np.abs(evaluated(program, [q], dtype) - exact(program, q)).max(axis=0)
         assert limits is not None and np.all(errors <= limits)
         assert np.max(limits) < 1000 * np.max(errors)
@@ -275,7 +275,7 @@ def test_each_instruction_is_the_same_in_c_and_numpy(kind: Kind, tmp_path: Path)
     x, y = (z.ravel() for z in np.meshgrid(numbers, numbers))
     operands = (0, 1) if kind in TWO else (0,)
     program = Program((2,), (), (Op(kind, (2,), operands),), (2,))
-    body = "\n".join(statements(program, ["q"], "y", "float64"))
+    body = "\n".join(statements(program, ["q"], {"y": 1}, "float64"))
     (tmp_path / "f.c").write_text(f"#include <math.h>\nvoid f(const double q[2], double y[1]) {{ {body} }}\n")
     call(
         "cc",

@@ -14,6 +14,7 @@ from robot_dyn.foundations import PlanError
 from robot_dyn.tools.identify import FourierSeries, Information, gram
 from robot_dyn.tools.identify.base_parameters import base_parameters
 from robot_dyn.tools.identify.excitation import Problem, _limits, motion
+from tests.long import long, stress
 
 ARM = rd.load("planar_2r")
 LIMITS = {"velocity": 2.0, "acceleration": 9.0, "torque": 60.0, "lower": -2.0, "upper": 2.0}
@@ -178,8 +179,7 @@ def test_wrong_requests_raise_errors(arguments: dict[str, object]) -> None:
         rd.tools.identify.excite(ARM, **({"duration_s": 6.0, "limits": LIMITS} | arguments))  # pyright: ignore
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["ur5", "panda"])
+@pytest.mark.parametrize("name", [*long(["ur5"]), *stress(["panda"])])
 def test_real_arms_gain_as_much(name: str) -> None:
     """By 0.5 a parameter above the best of 1000, for six and seven joints with the limits of their files."""
     arm = rd.load(name)

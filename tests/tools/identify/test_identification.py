@@ -14,22 +14,25 @@ from scipy.optimize import least_squares
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
 from robot_dyn.tools.identify import (
+    MARGIN,
     Fit,
     Identification,
     LogError,
     Rows,
     Signals,
+    distance,
     estimate,
     fit,
     identify,
     links_of,
     low_pass,
     model_of,
+    nearest_bodies,
     nearest_possible,
     pseudo_inertia,
     read_log,
+    whitening,
 )  # fmt: skip
-from robot_dyn.tools.identify.physical import MARGIN, distance, nearest_bodies
 from tests.command import spawn
 from tests.tools.identify import logs
 
@@ -197,6 +200,15 @@ def test_the_nearest_bodies_are_those_of_the_log_cholesky_parametrisation(spread
     assert np.allclose(found, bodies(referee.x.reshape(-1, 10)), atol=tolerance)
     edge = min(np.linalg.eigvalsh(pseudo_inertia(body))[0] for body in found.reshape(-1, 10)) < 2 * MARGIN
     assert edge == (spread > 0.5)
+
+
+def test_a_covariance_is_whitened_also_near_a_singular_one() -> None:
+    """L Σ Lᵀ = 1; of two equal parameters of variance 1, a common shift by 1 has the distance 1."""
+    A = np.random.default_rng(0).normal(size=(5, 5)) * [1e-6, 1.0, 1e3, 1.0, 1.0]
+    L = whitening(A.T @ A)
+    assert np.allclose(L @ (A.T @ A) @ L.T, np.eye(5), atol=1e-9)
+    L = whitening(np.ones((2, 2)))
+    assert np.sum((L @ [1.0, 1.0]) ** 2) == pytest.approx(1.0)
 
 
 def test_links_and_the_rest_of_their_bodies_make_up_the_arm() -> None:

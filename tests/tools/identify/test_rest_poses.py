@@ -97,6 +97,20 @@ def test_a_tilt_about_parallel_axes_cannot_be_seen() -> None:
     assert not static(arm, Poses(q, arm.N(q) + side, side), noise=0.01, tilt=False).blind
 
 
+def test_means_that_disagree_need_the_noise() -> None:
+    """Means of the first joint alone do not determine all parameters; without noise, none are on all of them."""
+    stated, _, model, x = arms()
+    both = two_sided(4, 12)
+    mixed = Poses(both.q, both.tau, both.approach * [1, 0, 0, 0])
+    with pytest.raises(QueryError):
+        static(stated, mixed, friction=FRICTION)
+    estimate = static(stated, mixed, friction=FRICTION, noise=0.05)
+    assert estimate.kind is Kind.SET
+    assert (estimate.lower <= x + 1e-6).all()
+    assert (x <= estimate.upper + 1e-6).all()
+    assert estimate.parameters == model.parameters
+
+
 def test_impossible_requests_raise_errors() -> None:
     stated, poses = arms()[0], one_sided(3)
     for arguments in ({}, {"friction": 0.01}, {"friction": -1.0}, {"friction": [1.0, 2.0]}):

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import robot_dyn as rd
 from robot_dyn.foundations import MissingExtraError, PlanError
 from robot_dyn.tools.motors.planning.geometric_path import in_time, through
-from tests.long import long
+from tests.long import third
 
 LIMITS = {"effort": 20.0, "velocity": 3.0}  # for arms whose files state none
 WAY = np.array(  # the fourth and fifth joint reverse at one place
@@ -41,7 +41,7 @@ def _way_points(robot: rd.Robot, seed: int, count: int = 5) -> np.ndarray:
 @toppra
 @pytest.mark.parametrize(
     ("name", "friction"),
-    [*SOME, *long(case for case in product(ARMS, FRICTION) if case not in SOME)],
+    [*SOME, *third(case for case in product(ARMS, FRICTION) if case not in SOME)],
 )
 def test_no_torque_is_above_its_limit_and_nearly_always_one_limit_binds(name: str, friction: str) -> None:
     """Inverse dynamics at 10 000 times, viscous friction of 20 % of the limit at full speed."""

@@ -25,12 +25,11 @@ from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, shrunk, worst
 from tests.command import run
 from tests.hostile.kinds import AXIS, LIMIT
 from tests.hostile.kinds import arm as altered
-from tests.long import long
+from tests.long import long, stress
 from tests.promised import check_document
 from tests.short_stress import short_stress
 
-MORE = ("planar_2r", "cart_pole", "mimic_chain", "ur5")
-ARMS = ["pendulum", *(pytest.param(each, marks=pytest.mark.long) for each in MORE)]
+ARMS = ["pendulum", *long(["mimic_chain"]), *stress(["planar_2r", "cart_pole", "ur5"])]
 FOREVER = 1e9  # [s]: what is found is not to depend on the load of the machine
 
 

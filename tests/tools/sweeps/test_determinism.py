@@ -11,7 +11,7 @@ import robot_dyn as rd
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work
 from robot_dyn.tools.sweeps.rows import digest_of
-from tests.long import long
+from tests.long import long, stress
 from tests.tools.sweeps.swept import SCENE, digest, scene, swept
 
 NOISE = '\n[[control.position]]\nkind = "noise"\ndeviation_rad = 0.01\n'
@@ -21,7 +21,7 @@ STOPS = (
 )
 
 
-@pytest.mark.parametrize(("chunk", "threads"), [(7, 2), (65, 5), *long([(1, 3), (64, 1), (150, 2)])])
+@pytest.mark.parametrize(("chunk", "threads"), [(7, 2), *long([(65, 5)]), *stress([(1, 3), (64, 1), (150, 2)])])
 def test_rows_do_not_depend_on_chunks_and_threads(tmp_path: Path, chunk: int, threads: int) -> None:
     sweep = swept(tmp_path, 150)
     whole = digest(sweep)

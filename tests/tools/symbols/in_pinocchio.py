@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pinocchio as pin
 import sympy as sp
 
 from robot_dyn.lagrange import Joint, Tree, tree_of
-from robot_dyn.tools.symbols import Lettering, Numbers, SymbolicEquations, body_numbers, readable
+from robot_dyn.tools.symbols import Component, Lettering, SymbolicEquations, body_numbers, readable
 
 Matrices = dict[str, np.ndarray]
 BASE = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")  # in the order of Pinocchio's parameters
@@ -44,7 +45,7 @@ def differences(equations: SymbolicEquations, rng: np.random.Generator, states: 
 def rate_is_C_plus_its_transpose(equations: SymbolicEquations) -> bool:
     """Return True if Ṁ = Σ ∂M/∂q_k v_k and C + Cᵀ are the same polynomials: with ds = c, dc = −s."""
     M, C = equations.polynomials["M"], equations.polynomials["C"]
-    ring = next(x.ring for x in M.flat if not isinstance(x, int))
+    ring = M[0, 0].ring
     rate = 0 * M
     for k in range(equations.n):
         q, v = f"q{k + 1}", ring.generator(f"v{k + 1}")
@@ -93,7 +94,17 @@ def _lettered(equations: SymbolicEquations, values: dict[str, float]) -> tuple[T
     tree = lettering.tree(readable(tree_of(arm.description, arm.edits)), arm.joint_names)
     every = {name: meaning.value for name, meaning in lettering.letters.items()} | values
     every |= {name: values[one] for name in every if name[0] == "I" and (one := name.partition("_")[0]) in values}
-    return tree, Numbers(every).number
+
+    def number(literal: Any) -> float:
+        if isinstance(literal, Component):
+            angles = {
+                name: replace(x, value=number(x))
+                for name, x in (("azimuth", literal.azimuth), ("elevation", literal.elevation))
+            }
+            return float(replace(literal, **angles))
+        return float(replace(literal, value=every[name]) if (name := getattr(literal, "name", "")) else literal)
+
+    return tree, number
 
 
 def _model(equations: SymbolicEquations, values: dict[str, float], added: float = 0.0, part: float = 1.0) -> Any:

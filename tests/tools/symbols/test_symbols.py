@@ -24,7 +24,7 @@ from tests.tools.symbols.in_pinocchio import differences, rate_is_C_plus_its_tra
 
 OWN = Path(__file__).with_name("spatial_3r.urdf")
 ARMS = [  # a fifth of those that are printed; the others are in tests.campaigns.symbols
-    ("planar_2r", "file"), ("cart_pole", "file"), ("quadruped", "base"), ("flyball_governor", "base"),
+    ("planar_2r", "file"), ("cart_pole", "file"), ("iris", "file"), ("quadruped", "base"), ("flyball_governor", "base"),
     (str(OWN), "file"), (str(OWN), None),
 ]  # fmt: skip
 LONG = [("finger_edu", "file"), ("bolt", "file"), ("hextilt_flying_arm_5", "base"), ("b1", "base"), ("ur5", "base")]
@@ -186,17 +186,15 @@ def test_sums_are_broken_before_a_term_and_long_products_multiplied_out() -> Non
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex (Debian: texlive-latex-base)")
 @pytest.mark.parametrize(
-    ("arm", "letters"),
+    ("arm", "letters", "matrices"),
     [
-        ("planar_2r", "file"),
-        ("cart_pole", "file"),
-        (str(OWN), "file"),
-        pytest.param("ur5", "base", marks=pytest.mark.long),
+        ("planar_2r", "file", "MCN"), ("cart_pole", "file", "MCN"), (str(OWN), "file", "MCN"),
+        pytest.param("ur5", "base", "MN", marks=pytest.mark.long),
     ],
-)
-def test_printed_lines_fit_a_page(arm: str, letters: Any, tmp_path: Path) -> None:
+)  # fmt: skip
+def test_printed_lines_fit_a_page(arm: str, letters: Any, matrices: str, tmp_path: Path) -> None:
     """TeX reports each line that is wider than the column, and each page that is too high."""
-    page = symbols(loaded(arm), letters).latex()
+    page = symbols(loaded(arm), letters).latex(matrices)
     head = r"\documentclass{article}\usepackage{amsmath}\allowdisplaybreaks\begin{document}"
     (tmp_path / "page.tex").write_text(head + page + r"\end{document}")
     done = subprocess.run(

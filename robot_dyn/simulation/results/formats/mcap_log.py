@@ -16,7 +16,7 @@ effects has none, and the record states the reason.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -57,13 +57,14 @@ def write(run: TrajectoryData, columns: list[Column], stream: BinaryIO) -> None:
         raise RunFileError(f"the run ends at t = {run.t[-1]:.3g} s; stamps of ROS 2 end at {_LONGEST_S:.3g} s")
     stamps = [round(t * _NS) for t in run.t.tolist()]
     causes, missing = _causes(run)
+    units = {f"unit of {x.quantity} {x.component}".rstrip(): x.unit for x in columns if x.unit}
     topics = [
         *_of_joints(run, stamps, causes),
         *_of_numbers([column for column in columns if column.quantity in _NUMBERS]),
     ]
     with needs("mcap_ros2.writer", extra=EXTRA).Writer(stream) as log:
         types = {name: log.register_msgdef(name, text) for name, text in _DEFINITIONS.items()}
-        log.add_metadata("robot_dyn", attributes(run) | _units(columns) | missing)
+        log.add_metadata("robot_dyn", attributes(run) | units | missing)
         for k, ns in enumerate(stamps):
             for name, kind, messages in topics:
                 log.write_message(name, types[kind], next(messages), ns, ns, k)
@@ -117,8 +118,3 @@ def _word(name: str) -> str:
 def _names(names: Sequence[str]) -> list[str]:
     """Return the names, made unique by numbers."""
     return [f"{name}_{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
-
-
-def _units(columns: Iterable[Column]) -> dict[str, str]:
-    """Return the unit of each column, by quantity and name; q, v and u are position, velocity and effort."""
-    return {f"unit of {column.quantity} {column.component}".rstrip(): column.unit for column in columns if column.unit}
