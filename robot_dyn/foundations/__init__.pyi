@@ -103,4 +103,3 @@ from robot_dyn.foundations.values import OnFirstUse as OnFirstUse
 from robot_dyn.foundations.values import ReadOnly as ReadOnly
 from robot_dyn.foundations.values import Value as Value
 from robot_dyn.foundations.values import read_only as read_only
-from robot_dyn.foundations.values import several as several

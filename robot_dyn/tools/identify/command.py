@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import robot_dyn as rd
-from robot_dyn.cli import AS_STATED, Force, Json, Name, RobotOptions, command, show
+from robot_dyn.cli import AS_STATED, Effects, Force, Json, Name, RobotOptions, command, show
 from robot_dyn.foundations import QueryError, target
 
 
@@ -16,7 +16,9 @@ def identify(
     log: str,
     /,
     output: str | None = None,
+    repeat: str | None = None,
     gains: str | None = None,
+    effects: Effects = None,
     cutoff: float = 8.0,
     force: Force = False,
     options: RobotOptions = AS_STATED,
@@ -29,13 +31,14 @@ def identify(
     Options:
         log (LOG.csv): The log.
         output (FILE): Write the corrected URDF (.urdf), a report (.html) or all data (.json).
+        repeat (LOG.csv): A second log of the same motion.
         gains (K1,K2,…): Drive gains in N m/A, one or one for each joint.
         cutoff (HZ): Cutoff of the filters.
     """
     from robot_dyn.report import ResultError
     from robot_dyn.tools.identify.result import KINDS
 
-    inputs: list[str | Path] = [path for path in (robot, log) if os.path.isfile(path)]
+    inputs: list[str | Path] = [path for path in (robot, log, repeat) if path and os.path.isfile(path)]
     path = target(output, KINDS, ResultError, inputs, force) if output else None
     try:
         factors = None if gains is None else [float(x) for x in gains.split(",")]
@@ -43,5 +46,6 @@ def identify(
         raise QueryError(f"--gains must be numbers separated by commas, got {gains!r}") from None
     if factors is not None and len(factors) == 1:
         factors = factors[0]
-    result = rd.tools.identify.identify(options.load(robot), log, gains=factors, cutoff_hz=cutoff)
+    arm = options.load(robot)
+    result = rd.tools.identify.identify(arm, log, repeat=repeat, gains=factors, effects=effects, cutoff_hz=cutoff)
     show(result, as_json=as_json, writes=[] if path is None else [lambda: result.save(path)])

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn import Robot
+from robot_dyn import Plant, Robot
 from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.foundations import instance, number, numbers, several, shown
+from robot_dyn.foundations import instance, number, numbers
 from robot_dyn.report import processor_and_versions
 from robot_dyn.tools.identify.corrected import corrected
-from robot_dyn.tools.identify.estimation import COULOMB, VISCOUS, Estimate, Model, estimate, model_of
+from robot_dyn.tools.identify.estimation import (
+    COULOMB,
+    LATEST_S,
+    STRIBECK,
+    VISCOUS,
+    Estimate,
+    Friction,
+    Model,
+    estimate,
+    model_of,
+)
 from robot_dyn.tools.identify.log import Log, LogError, read_log, swapped
 from robot_dyn.tools.identify.physical import Links, links_of, nearest_possible
-from robot_dyn.tools.identify.regression import Rows, fit, rms
+from robot_dyn.tools.identify.regression import Fit, Rows, fit, rms
 from robot_dyn.tools.identify.result import HeldOut, Identification, Parameter
 from robot_dyn.tools.identify.signals import Signals
 from robot_dyn.tools.identify.verdict import verdict_of
@@ -39,32 +49,37 @@ def identify(
     log: object,
     *,
     reference: PiecewisePolynomial | None = None,
+    repeat: object = None,
     gains: ArrayLike | None = None,
-    effects: Iterable[Effect] | None = None,
+    effects: Iterable[Effect] | str | None = None,
     cutoff_hz: float = CUTOFF_HZ,
     slow: ArrayLike | None = None,
 ) -> Identification:
     """Estimate the parameters of an arm, its friction and offsets from a log of its motion.
 
     Torques are linear in base parameters, rotor inertias, viscous and Coulomb friction, offsets and a time offset. They
-    are estimated by weighted instrumental variables from the desired motion, without rows of a joint near rest.
+    are estimated by weighted instrumental variables, without rows of a joint near rest. The instruments are the desired
+    motion, or the positions of a second log.
 
     Args:
         arm: The arm of the file; joints that do not move are locked.
         log: CSV file, data frame, columns by heading, or `Trajectory`: "t", "q JOINT", "tau JOINT" or "current JOINT",
             and "desired JOINT" if known. In a dict, "t", "q", "tau", "current" and "desired" may be arrays (m, n).
-        reference: The desired motion at the times of the log, if the log has no desired positions. Without it,
-            instruments are smoothed positions of the log, and intervals are less reliable.
+        reference: The desired motion at the times of the log, if the log has no desired positions.
+        repeat: A second log of the same motion, the source of instruments if there is no reference. Without both and
+            without desired positions, they are smoothed positions, and intervals are less reliable.
         gains: Drive gains, a number or (n,), in [N m/A], if the log has currents.
         effects: Friction that the arm is supposed to have, `ViscousFriction`, `DryFriction` or
-            `RegularisedCoulombFriction`; then wrong friction can be a cause in the verdict.
+            `RegularisedCoulombFriction`, or "urdf" for that of the file; then wrong friction can be a cause in the
+            verdict. With the Stribeck velocity of `DryFriction`, static friction is estimated too.
         cutoff_hz: Cutoff of the zero-phase filters of regressor and torque, in [Hz].
         slow: Speed below which rows of a joint are left out, a number or (n,), in [rad/s] or [m/s]; by default 5 % of
             the largest speed of the joint.
 
     Raises:
         LogError: If the log lacks positions or torques, a joint does not move, a torque is constant or saturated, two
-            columns are swapped, the motion does not determine the parameters, or the log is of another arm.
+            columns are swapped, torques are late or early by 20 ms, the motion does not determine the parameters, or
+            the log is of another arm.
         PlanError: If times are missing, or angles look like degrees.
         MissingExtraError: If cvxpy or clarabel is not installed: pip install 'robot-dyn[identify]'.
 
@@ -72,17 +87,16 @@ def identify(
     2014; Wensing, Kim, Slotine 2018.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=LogError)
-    links, stated = links_of(arm), _friction(arm, effects)
-    record = read_log(arm, log, reference, gains)
-    model, result = estimated(arm, record, cutoff_hz, slow)
+    links, friction = links_of(arm), _friction(arm, effects)
+    record = read_log(arm, log, reference, gains, repeat)
+    model, result = estimated(arm, record, cutoff_hz, slow, {} if friction is None else friction.stribeck)
     held_out = _held_out(model, result)
     _refuse_foreign(arm, result, held_out)
-    r = len(model.base.columns)
-    theta = nearest_possible(links, model.base.R, result.fit.values[:r], result.fit.covariance[:r, :r])
-    parameters = tuple(_parameters(model, result))
-    friction = _identified_friction(model, result)
-    robot, text = _corrected(arm, links, theta, friction, parameters, model, result)
-    determined, blind = _determined(model, result, links, theta)
+    found, r = result.fit, len(model.base.columns)
+    theta = nearest_possible(links, model.base.R, found.values[:r], found.covariance[:r, :r])
+    parameters = tuple(_parameters(model, found))
+    robot, text = _corrected(model, links, theta, found, parameters)
+    determined, blind = _determined(model, found, links, theta)
     confounded = (joint for i, joint in enumerate(arm.joint_names) if i not in model.rotors)
     return Identification(
         arm=arm.name,
@@ -90,19 +104,22 @@ def identify(
         determined=determined,
         blind=blind,
         confounded=tuple(f"rotor inertia of {joint} with {joint} Izz" for joint in confounded),
-        time_offset_s=float(result.fit.values[-1]),
-        time_offset_half_width_s=float(result.fit.half_widths[-1]),
+        time_offset_s=float(found.values[-1]),
+        time_offset_half_width_s=float(found.half_widths[-1]),
         held_out=held_out,
-        verdict=verdict_of(model, links, result, stated),
-        has_reference=record.reference is not None,
+        verdict=verdict_of(model, links, result, friction),
+        instruments=record.instruments,
         cutoff_hz=cutoff_hz,
         environment=processor_and_versions(),
         robot=robot,
         urdf=text,
+        file=arm,
     )
 
 
-def estimated(arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None) -> tuple[Model, Estimate]:
+def estimated(
+    arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None, stribeck: dict[int, float] | None = None
+) -> tuple[Model, Estimate]:
     """Return the linear model of an arm and its estimate from a log; for arguments and errors see `identify`."""
     cutoff_hz = number("cutoff_hz", cutoff_hz, above=0, error=LogError)
     if not _PERIODS / np.ptp(log.t) <= cutoff_hz <= 0.5 / log.step_s:
@@ -110,28 +127,35 @@ def estimated(arm: Robot, log: Log, cutoff_hz: float, slow: ArrayLike | None) ->
             f"cutoff_hz must be from {_PERIODS / np.ptp(log.t):.3g} Hz, for {np.ptp(log.t):.4g} s, to"
             f" {0.5 / log.step_s:.4g} Hz, half the rate of the log; got {cutoff_hz:g}"
         )
-    model = model_of(arm)
+    model = model_of(arm, stribeck)
     signals = Signals(float(log.t[0]), log.step_s, len(log.t), cutoff_hz)
     speed = np.abs(np.gradient(signals.first(log.q), log.step_s, axis=0)).max(axis=0)
     least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
-    return model, estimate(model, log, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
+    found = estimate(model, log, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
+    if abs(offset := float(found.fit.values[-1])) >= LATEST_S:
+        raise LogError(
+            f"torques are {'late' if offset > 0 else 'early'} by {1e3 * LATEST_S:g} ms or more; shift their columns in"
+            " time, or log positions and torques by one clock"
+        )
+    return model, found
 
 
-def _friction(arm: Robot, effects: Iterable[Effect] | None) -> np.ndarray | None:
-    """Return viscous and Coulomb friction of effects, (2, n); None without effects."""
+def _friction(arm: Robot, effects: Iterable[Effect] | str | None) -> Friction | None:
+    """Return the friction of effects; None without effects."""
     if effects is None:
         return None
-    result = np.zeros((2, arm.n))
-    if (given := several(effects)) is None:
-        raise LogError(f"effects must be a list of friction, got {shown(effects)}")
-    for effect in given:
+    viscous, coulomb, excess, stribeck = *np.zeros((3, arm.n)), {}
+    for effect in Plant(arm, effects).effects:
         if isinstance(effect, ViscousFriction):
-            result[0] += effect.viscous
+            viscous += effect.viscous
         elif isinstance(effect, DryFriction | RegularisedCoulombFriction):
-            result[1] += effect.coulomb
+            coulomb += effect.coulomb
+            if isinstance(effect, DryFriction) and effect.stribeck_velocity is not None:
+                excess += np.subtract(effect.static, effect.coulomb)
+                stribeck = dict(enumerate(np.broadcast_to(effect.stribeck_velocity, arm.n).tolist()))
         else:
             raise LogError(f"effects: {type(effect).__name__} is not friction; remove it from the log's torques first")
-    return result
+    return Friction(viscous, coulomb, excess, stribeck)
 
 
 def _refuse(arm: Robot) -> Any:
@@ -166,10 +190,10 @@ def _held_out(model: Model, found: Estimate) -> HeldOut:
     """Return rms errors of the last quarter of the log, with numbers from its first three."""
     rows, m = found.rows, len(found.rows.tau)
     training = np.arange(m)[:, None] < _TRAINING * m
-    n, last = model.arm.n, rows.used & ~training
+    last = rows.used & ~training
     own = model.stated
     rest = rows.tau - rows.Y[..., : len(own)] @ own
-    joints = np.arange(len(own), len(own) + 3 * n)
+    joints = np.arange(len(own), len(rows.names) - 1)
     fitted = fit(rows.where(training).only(joints, rest))
     new = fit(rows.where(training))
     return HeldOut(
@@ -190,63 +214,54 @@ def _refuse_foreign(arm: Robot, found: Estimate, held_out: HeldOut) -> None:
         )
 
 
-def _parameters(model: Model, found: Estimate) -> Iterable[Parameter]:
-    own = model.stated
-    values = np.concatenate([own, np.full(len(found.fit.names) - len(own), np.nan)])
-    robust = found.fit.half_widths / found.fit.standard_errors * np.sqrt(np.diag(found.fit.robust))
-    for row in zip(found.fit.names[:-1], found.fit.values, found.fit.half_widths, robust, values, strict=False):
-        yield Parameter(*row[:1], *map(float, row[1:]))
-
-
-def _identified_friction(model: Model, found: Estimate) -> np.ndarray:
-    by_name = dict(zip(found.fit.names, found.fit.values, strict=True))
-    return np.array(
-        [[max(0.0, by_name[f"{joint} {kind}"]) for joint in model.arm.joint_names] for kind in (VISCOUS, COULOMB)]
-    )
+def _parameters(model: Model, found: Fit) -> Iterable[Parameter]:
+    own = np.concatenate([model.stated, np.full(len(found.names) - len(model.stated), np.nan)])
+    robust = found.quantile * np.sqrt(np.diag(found.robust))
+    for name, *columns in zip(found.names[:-1], found.values, found.half_widths, robust, own, strict=False):
+        yield Parameter(name, *map(float, columns))
 
 
 def _determined(
-    model: Model, found: Estimate, links: Links, theta: np.ndarray
+    model: Model, found: Fit, links: Links, theta: np.ndarray
 ) -> tuple[tuple[Parameter, ...], tuple[str, ...]]:
     """Return the inertial parameters of bodies that the log determines alone, and the names of the others."""
-    base, r = model.base, len(model.base.columns)
-    C = found.fit.covariance[:r, :r]
-    factor = found.fit.half_widths[0] / found.fit.standard_errors[0]
-    bodies = np.array([links.X[b] @ theta[b] + links.rest[b] for b in range(len(theta))]).ravel()
-    own = model.arm.inertial_parameters
+    R, own = model.base.R, model.arm.inertial_parameters
+    C, unit = found.covariance[: len(R), : len(R)], np.eye(len(own))
+    bodies = (np.einsum("bij,bj->bi", links.X, theta) + links.rest).ravel()
     alone, blind = [], []
-    for k, name in enumerate(base.full_names):
-        c = np.linalg.lstsq(base.R.T, np.eye(len(own))[k], rcond=None)[0]
-        if np.linalg.norm(base.R.T @ c - np.eye(len(own))[k]) < 1e-6:
-            w = factor * float(np.sqrt(c @ C @ c))
-            alone.append(Parameter(name, float(bodies[k]), w, np.nan, float(own[k])))
+    for k, (name, c) in enumerate(zip(model.base.full_names, np.linalg.lstsq(R.T, unit, rcond=None)[0].T, strict=True)):
+        if np.linalg.norm(R.T @ c - unit[k]) < 1e-6:
+            width = found.quantile * float(np.sqrt(c @ C @ c))
+            alone.append(Parameter(name, float(bodies[k]), width, np.nan, float(own[k])))
         else:
             blind.append(name)
     return tuple(alone), tuple(blind)
 
 
 def _corrected(
-    arm: Robot, links: Links, theta: np.ndarray, friction: np.ndarray, parameters: tuple[Parameter, ...], model: Model,
-    found: Estimate,
-) -> tuple[Robot, bytes]:  # fmt: skip
-    """Return the arm of the corrected file, with the edits of `arm`, and the text of the file."""
+    model: Model, links: Links, theta: np.ndarray, found: Fit, parameters: tuple[Parameter, ...]
+) -> tuple[Robot, bytes]:
+    """Return the arm of the corrected file, with the edits of the model's arm, and the text of the file."""
+
+    def listed(part: str, names: Container[str]) -> str:
+        own = [p for p in parameters if p.name.startswith(f"{part} ") and p.name in names]
+        return "; ".join(f"{p.name.removeprefix(part).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own)
+
+    arm, c, r = model.arm, len(model.stated), len(model.base.columns)
     notes: dict[str, str] = {}
     for body, link in zip(arm.body_names, links.names, strict=True):
-        own = [p for p in parameters if p.name.startswith(f"{body} ") and p.name in model.base.names]
-        values = "; ".join(f"{p.name.removeprefix(body).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own)
-        notes[link] = f"identified base parameters (95 %): {values or 'none'}; the rest is nearest to the old file"
+        values = listed(body, model.base.names) or "none"
+        notes[link] = f"identified base parameters (95 %): {values}; the rest is nearest to the old file"
     for joint in arm.joint_names:
-        own = [p for p in parameters if p.name in (f"{joint} {VISCOUS}", f"{joint} {COULOMB}")]
-        notes[joint] = "identified friction (95 %): " + "; ".join(
-            f"{p.name.removeprefix(joint).strip()} {p.value:.4g} +/- {p.half_width:.2g}" for p in own
-        )
+        names = {f"{joint} {kind}" for kind in (VISCOUS, COULOMB, STRIBECK)}
+        notes[joint] = f"identified friction (95 %): {listed(joint, names)}"
+    friction = np.maximum(found.values[c : c + 2 * arm.n].reshape(2, arm.n), 0.0)
     text = corrected(arm, links, theta, friction, notes)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # findings about the file, which the arm has shown already
         robot = Robot.from_text(text, source=arm.description.source)
     if arm.edits.lock:
         robot = robot.with_(lock=dict(arm.edits.lock))
-    armature = dict(zip(arm.joint_names, np.array(arm.armature).tolist(), strict=True))
-    for i, value in zip(model.rotors, found.fit.values[len(model.base.columns) :], strict=False):
-        armature[arm.joint_names[i]] = max(0.0, float(value))
+    armature = np.array(arm.armature, float)
+    armature[list(model.rotors)] = np.maximum(found.values[r:c], 0.0)
     return robot.with_(gravity=arm.gravity, armature=armature), text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -23,6 +23,7 @@ _STILL = 1e-3  # [rad] or [m]: range of a joint that does not move
 _STUCK, _STUCK_PART = 5, 0.01  # equal samples in a row at an extreme, and their part of a log
 _GAINS = 1e-4, 1e6  # [N m/A]
 _LEAST = 50  # samples
+_ANOTHER = 0.1  # rms difference of positions of another motion, of their deviation
 
 
 class LogError(RobotDynError):
@@ -39,12 +40,14 @@ class Log(Value):
         q: Positions, (m, n), in [rad] or [m].
         tau: Torques, (m, n), in [N m] or [N].
         reference: Positions, velocities and accelerations of the desired motion, each (m, n); None without one.
+        repeated: Positions of a second log of the same motion, (m, n), in [rad] or [m]; None without one.
     """
 
     t: np.ndarray
     q: np.ndarray
     tau: np.ndarray
     reference: State | None
+    repeated: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -54,9 +57,18 @@ class Log(Value):
         """Time between samples, in [s]."""
         return float(self.t[1] - self.t[0])
 
+    @property
+    def instruments(self) -> str:
+        """The source of the instruments of the estimate."""
+        return "desired motion" if self.reference else "smoothed positions" if self.repeated is None else "second log"
+
 
 def read_log(
-    arm: Robot, source: object, reference: PiecewisePolynomial | None = None, gains: ArrayLike | None = None
+    arm: Robot,
+    source: object,
+    reference: PiecewisePolynomial | None = None,
+    gains: ArrayLike | None = None,
+    repeat: object = None,
 ) -> Log:
     """Return the log in a source.
 
@@ -68,32 +80,61 @@ def read_log(
             and "desired" may be arrays (m, n) in the order of the joints.
         reference: The desired motion at the times of the log.
         gains: Drive gains, a number or (n,), in [N m/A], that turn currents into torques.
+        repeat: A second log of the same motion, instead of desired positions; only its times and positions are read.
 
     Raises:
-        LogError: If positions or torques are missing, a torque is constant or saturated, or a joint does not move.
+        LogError: If positions or torques are missing, a torque is constant or saturated, a joint does not move, or the
+            second log is of another motion.
         PlanError: If times are missing, or angles look like degrees.
     """
-    table = table_of(_spread(arm, source), arm.joint_names, {}, None, None)
-    columns = {name_of(head): head for head in table.columns}
-    times = {head: x for head, x in table.columns.items() if name_of(head) in ("t", "time", "timestamp", "stamp")}
-    q_heads = _heads(arm, columns, ("q {}", "{}"))
-    q_columns = {_renamed(head, joint): table.columns[head] for joint, head in q_heads.items()}
-    samples = recorded(arm, times | q_columns)
-    refuse_other_units(samples)
-    t, q = samples.t, samples.q
-    if len(t) < _LEAST:
-        raise LogError(f"the log has {len(t)} samples, at least {_LEAST} are needed; record a longer motion")
-    tau = _torques(arm, table.columns, columns, gains)
+    table, columns, t, q = _positions(arm, source)
+    tau = _torques(arm, table, columns, gains)
     _refuse(arm, q, tau)
-    times_even = np.arange(t[0], t[-1], float(np.median(np.diff(t))))
+    even = np.arange(t[0], t[-1], float(np.median(np.diff(t))))
     desired = [columns.get(f"desired {joint}") for joint in arm.joint_names]
-    along = None
+    along, log = None, Log(even, evenly(t, q, even), evenly(t, tau, even), None)
     if reference is not None:
         instance("reference", reference, PiecewisePolynomial, "give the reference of a plan", error=LogError)
-        along = reference.at(times_even)
+        along = reference.at(even)
+    elif repeat is not None:
+        return _with_repeat(log, *_positions(arm, repeat)[2:])
     elif None not in desired:
-        along = _rates(t, np.stack([table.columns[str(head)] for head in desired], axis=1), times_even)
-    return Log(times_even, evenly(t, q, times_even), evenly(t, tau, times_even), along)
+        along = _rates(t, np.stack([table[str(head)] for head in desired], axis=1), even)
+    return replace(log, reference=along)
+
+
+def _positions(arm: Robot, source: object) -> tuple[Mapping[str, np.ndarray], dict[str, str], np.ndarray, np.ndarray]:
+    """Return the columns of a source, their headings by name, its times, and its positions, (m, n)."""
+    table = table_of(_spread(arm, source), arm.joint_names, {}, None, None).columns
+    columns = {name_of(head): head for head in table}
+    times = {head: x for head, x in table.items() if name_of(head) in ("t", "time", "timestamp", "stamp")}
+    q_heads = _heads(arm, columns, ("q {}", "{}"))
+    samples = recorded(arm, times | {_renamed(head, joint): table[head] for joint, head in q_heads.items()})
+    refuse_other_units(samples)
+    if len(samples.t) < _LEAST:
+        raise LogError(f"the log has {len(samples.t)} samples, at least {_LEAST} are needed; record a longer motion")
+    return table, columns, samples.t, samples.q
+
+
+def _with_repeat(log: Log, t: np.ndarray, q: np.ndarray) -> Log:
+    """Return the part of a log in which a second log has the same motion, shifted by the lag of largest correlation."""
+    from scipy.signal import correlate
+
+    again = evenly(t, q, np.arange(t[0], t[-1], log.step_s))
+    v, w = (np.diff(x, axis=0) / log.q.std(axis=0) for x in (log.q, again))
+    correlation = sum(correlate(a, b, method="fft") for a, b in zip(v.T, w.T, strict=True))
+    lag = int(np.argmax(correlation)) - (len(w) - 1)  # log.q[k] is again[k − lag]
+    both = slice(max(lag, 0), min(len(log.t), len(again) + lag))
+    one, other = log.q[both], again[both.start - lag : both.stop - lag]
+    if np.array_equal(one, other):
+        raise LogError("repeat is the log itself, with the same noise; record the motion a second time")
+    apart = np.sqrt(((one - other) ** 2).mean(axis=0)) / log.q.std(axis=0)
+    if (worst := float(apart.max())) > _ANOTHER:
+        raise LogError(
+            f"repeat is not of the same motion: shifted by {lag * log.step_s:.3g} s, where it fits best, its positions"
+            f" differ by {worst:.0%} of their deviation; record the motion twice"
+        )
+    return Log(log.t[both], one, log.tau[both], None, other)
 
 
 def _spread(arm: Robot, source: object) -> Any:

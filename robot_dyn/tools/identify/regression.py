@@ -3,8 +3,8 @@
     τ = Y_k(q, v, a) π + v b + sign(v) c + τ₀ − δ dτ/dt + e
     θ = (Zᵀ W Y)⁻¹ Zᵀ W τ,   cov θ = (Zᵀ W Y)⁻¹ Zᵀ W S W Z (Zᵀ W Y)⁻ᵀ
 
-Z is the same regressor on a motion that is independent of the noise of the log: least squares are biased, because noise
-of q enters Y and, through the controller, τ. S is the autocovariance of the residuals between all joints.
+Z is the same regressor on a motion that nearly lacks the noise of the log: least squares are biased, because noise of q
+enters Y and, through the controller, τ. S is the autocovariance of the residuals between all joints.
 Sums of it are corrected for the part of the errors that the fit takes.
 [Young 2011; Janot, Vandanjon, Gautier 2014; Newey, West 1987]
 """
@@ -84,11 +84,16 @@ class Fit(Value):
         return np.sqrt(np.diag(self.covariance))
 
     @cached_property
-    def half_widths(self) -> np.ndarray:
-        """Half widths of the 95 % intervals, (p,)."""
+    def quantile(self) -> float:
+        """Half width of a 95 % interval in standard errors, by Student's distribution."""
         from scipy.stats import t
 
-        return t.ppf((1 + LEVEL) / 2, self.dof) * self.standard_errors
+        return float(t.ppf((1 + LEVEL) / 2, self.dof))
+
+    @property
+    def half_widths(self) -> np.ndarray:
+        """Half widths of the 95 % intervals, (p,)."""
+        return self.quantile * self.standard_errors
 
     @property
     def rms(self) -> np.ndarray:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from robot_dyn.foundations import (
 from robot_dyn.foundations import save as save_file
 from robot_dyn.report import ResultError
 from robot_dyn.tools.identify.verdict import Verdict
+
+if TYPE_CHECKING:
+    from robot_dyn.tools.doctor import RobotDifference
 
 _JSON = FileKind("a result", ".json", b'{\n "arm":')
 _PAGE = FileKind("a report", ".html", b"<!doctype html>")
@@ -92,11 +96,12 @@ class Identification(Answer, Value):
         time_offset_half_width_s: Half width of its 95 % interval, in [s].
         held_out: Errors in a part of the log that was not used.
         verdict: Causes of the difference between file and log.
-        has_reference: True if the desired motion was known; otherwise intervals are less reliable.
+        instruments: "desired motion", "second log" or "smoothed positions", whose intervals are less reliable.
         cutoff_hz: Cutoff of the filters, in [Hz].
         environment: Versions and processor.
         robot: The arm with identified parameters.
         urdf: Text of its URDF.
+        file: The arm of the file.
     """
 
     arm: str
@@ -108,14 +113,22 @@ class Identification(Answer, Value):
     time_offset_half_width_s: float
     held_out: HeldOut
     verdict: Verdict
-    has_reference: bool
+    instruments: str
     cutoff_hz: float
     environment: dict[str, str]
     robot: Robot = field(metadata=UNREPORTED)
     urdf: bytes = field(metadata=UNREPORTED)
+    file: Robot = field(metadata=UNREPORTED)
 
     def __post_init__(self) -> None:
         read_only(self)
+
+    @cached_property
+    def difference(self) -> RobotDifference:
+        """The difference of the identified arm from that of the file."""
+        from robot_dyn.tools.doctor import diff_robots
+
+        return diff_robots(self.file, self.robot)
 
     @reported
     def sentence(self) -> str:
@@ -130,8 +143,11 @@ class Identification(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         yield self.sentence
-        if not self.has_reference:
-            yield "without the desired motion: 95 % intervals may be too narrow"
+        if (worst := self.difference.worst) is not None:
+            size = f"{abs(worst.difference):.3g} {worst.unit}"
+            yield f"torques at rest differ from those of the file by up to {size}, at {worst.joint}"
+        if self.instruments == "smoothed positions":
+            yield "without the desired motion or a second log: 95 % intervals may be too narrow"
         offset, width = 1e3 * self.time_offset_s, 1e3 * self.time_offset_half_width_s
         yield f"torques are late by {offset:.3g} ± {width:.2g} ms; filters of {self.cutoff_hz:g} Hz"
         yield ""

@@ -24,7 +24,7 @@ from robot_dyn.tools.identify.discrimination import Experiment, experiment_of
 from robot_dyn.tools.identify.physical import Links
 
 if TYPE_CHECKING:
-    from robot_dyn.tools.identify.estimation import Estimate, Model
+    from robot_dyn.tools.identify.estimation import Estimate, Friction, Model
     from robot_dyn.tools.identify.excitation import State
 
     Columns = Callable[..., np.ndarray]
@@ -110,22 +110,22 @@ class Verdict(Value):
         return tuple(x for x in self.causes if x.bic - self.causes[0].bic < SAME) if self.seen else ()
 
 
-def verdict_of(model: Model, links: Links, found: Estimate, friction: np.ndarray | None) -> Verdict:
+def verdict_of(model: Model, links: Links, found: Estimate, friction: Friction | None) -> Verdict:
     """Return the causes of the difference between the file and a log.
 
     Args:
         model: Model of the log.
         links: Links of the arm.
         found: Estimate of all parameters, which gives the noise.
-        friction: Viscous and Coulomb friction that the arm is supposed to have, (2, n); None if it is fitted with each
-            cause, which then cannot be friction.
+        friction: The friction that the arm is supposed to have; None if it is fitted with each cause, which then cannot
+            be friction.
     """
     signals, rows, n = found.signals, found.rows, model.arm.n
     arm, state = model.arm.with_(armature=0.0), found.state
     r, own = len(model.stated), np.zeros(len(rows.names))
     own[:r] = model.stated
     if friction is not None:
-        own[r : r + 2 * n] = friction.ravel()
+        own[r:-1] = friction.values
     shifted = rows.tau - rows.Y[..., -1] * found.fit.values[-1]  # back to the times of the log
     candidates, shown = [], {}
     for *name, columns in _candidates(arm, links, model, rows.Y, own, friction):
@@ -204,7 +204,7 @@ Candidate = tuple[str, str, str, float, "Columns"]
 
 
 def _candidates(
-    arm: Robot, links: Links, model: Model, Y: np.ndarray, own: np.ndarray, friction: np.ndarray | None
+    arm: Robot, links: Links, model: Model, Y: np.ndarray, own: np.ndarray, friction: Friction | None
 ) -> Iterator[Candidate]:
     """Yield kind, place, unit, factor of the unit and derivative columns of each cause."""
     base = model.base
@@ -242,7 +242,8 @@ def _candidates(
         yield "torque offset", joint, of_joint("N m", kind), 1.0, of_joint_alone(i, c + 2 * n + i)
         yield "position offset", joint, of_joint("rad", kind), 1.0, _position_offset(arm, model, i)
         if friction is not None:
-            yield "friction", joint, "N m s/rad, N m", 1.0, of_joint_alone(i, c + i, c + n + i)
+            curve = [c + 3 * n + s for s, j in enumerate(model.stribeck) if i == j]
+            yield "friction", joint, "N m s/rad, N m", 1.0, of_joint_alone(i, c + i, c + n + i, *curve)
 
         def gain(q: np.ndarray, v: np.ndarray, a: np.ndarray, i: int = i) -> np.ndarray:
             result = np.zeros((*Y.shape[:2], 1))
@@ -252,7 +253,7 @@ def _candidates(
         yield "gain", joint, "%", 100.0, gain
     if friction is not None:
         both = np.stack([zero, zero], axis=1)
-        both[c : c + n, 0], both[c + n : c + 2 * n, 1] = friction
+        both[c : c + n, 0], both[c + n : -1, 1] = own[c : c + n], own[c + n : -1]
         yield "friction", "", "%", 100.0, lambda q, v, a: Y @ both
     yield "mounting", "", "°", 180 / np.pi, _mounting(arm)
     yield "time offset", "", "ms", 1e3, lambda q, v, a: -Y[..., -1:]

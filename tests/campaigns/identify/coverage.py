@@ -1,12 +1,13 @@
 """Coverage of the intervals of `identify` on simulated logs: python -m tests.campaigns.identify.coverage ur5 10 20.
 
 Each file, friction and motion is random; it runs with several seeds of noise, in closed loop, with one tick of delay.
+Instruments are the desired motion; with --instruments, a second log or smoothed positions.
 """
 
 from __future__ import annotations
 
-import sys
-from dataclasses import dataclass
+import argparse
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,12 +78,13 @@ def case(name: str, number: int) -> Case:
     return Case(file, true, reference, viscous, coulomb, TORQUE * torque, loop)
 
 
-def simulated(case: Case, seed: int) -> tuple[Log, rd.Trajectory]:
+def simulated(case: Case, seed: int, encoder: float = ENCODER) -> tuple[Log, rd.Trajectory]:
     """Return the log of a run, and the run."""
     q0, v0, _ = case.reference.at(0.0)
     loop = rd.control.Loop(
-        case.loop.controller, case.loop.position, case.loop.velocity, actuation_delay_periods=1.0, noise_seed=seed
-    )
+        *(case.loop.controller, [rd.control.Noise(encoder)], case.loop.velocity),
+        actuation_delay_periods=1.0, noise_seed=seed,
+    )  # fmt: skip
     dry = rd.effects.RegularisedCoulombFriction(case.coulomb, velocity_scale=0.01)
     run = rd.simulate(
         rd.Plant(case.true, [rd.effects.ViscousFriction(case.viscous), dry]), q0, v0, controller=loop,
@@ -109,9 +111,9 @@ def bound(case: Case, model: Model, run: rd.Trajectory, found: Estimate) -> np.n
     return np.sqrt(np.diag(np.linalg.inv(every * W.T @ W)))
 
 
-def main(name: str, cases: int, seeds: int) -> None:
+def main(name: str, cases: int, seeds: int, instruments: str = "desired", encoder: float = ENCODER) -> None:
     """Print pooled and worst coverage, efficiency and time offsets."""
-    inside, late, ratio, names = [], [], [], ()
+    inside, late, ratio, bounds, names = [], [], [], [], ()
     for number in range(cases):
         drawn = case(name, number)
         model = model_of(drawn.file)
@@ -122,8 +124,11 @@ def main(name: str, cases: int, seeds: int) -> None:
             [base.R @ drawn.true.inertial_parameters, rotors, drawn.viscous, drawn.coulomb, zero, [LATE_S]]
         )
         slow = 0.05 * np.abs(drawn.reference.at(np.linspace(0, DURATION_S, 500))[1]).max(axis=0)
+        following = simulated(drawn, 1000 * number, encoder)
         for seed in range(seeds):
-            log, run = simulated(drawn, 1000 * number + seed)
+            (log, run), following = following, simulated(drawn, 1000 * number + seed + 1, encoder)
+            if instruments != "desired":
+                log = replace(log, reference=None, repeated=following[0].q if instruments == "second" else None)
             found = estimate(model, log, Signals(0.0, TICK_S, len(log.t), CUTOFF_HZ), slow)
             fit = found.fit
             inside.append(np.abs(fit.values - truth) <= fit.half_widths)
@@ -132,10 +137,14 @@ def main(name: str, cases: int, seeds: int) -> None:
             if seed == 0:
                 least = bound(drawn, model, run, found)
                 ratio.append(fit.standard_errors / least)
-        _report(name, np.array(inside), np.array(late), np.array(ratio), names)
+                bounds.append(least[-1])
+        label = f"{name}, {instruments}, {encoder:g} rad, {len(inside)} runs"
+        _report(label, np.array(inside), 1e3 * np.array(late), np.array(ratio), 1e3 * np.array(bounds), names)
 
 
-def _report(name: str, inside: np.ndarray, late: np.ndarray, ratio: np.ndarray, names: tuple[str, ...]) -> None:
+def _report(
+    label: str, inside: np.ndarray, late: np.ndarray, ratio: np.ndarray, bounds: np.ndarray, names: tuple[str, ...]
+) -> None:
     from scipy.stats import beta
 
     m, hits = len(inside), inside.sum(axis=0)
@@ -143,13 +152,21 @@ def _report(name: str, inside: np.ndarray, late: np.ndarray, ratio: np.ndarray, 
     low = beta.ppf(0.025, hits[worst], m - hits[worst] + 1)
     largest = ratio.max(axis=0)
     print(
-        f"{name}: {m} runs, pooled coverage {inside.mean():.4f}; worst {names[worst]}: {hits[worst] / m:.3f}, lower end"
+        f"{label}: pooled coverage {inside.mean():.4f}; worst {names[worst]}: {hits[worst] / m:.3f}, lower end"
         f" {low:.3f}; standard errors / Cramér–Rao: median {np.median(ratio):.2f}, largest {largest[:-1].max():.2f}"
         f" ({names[int(largest[:-1].argmax())]}), of the time offset {largest[-1]:.2f};"
-        f" time offset {1e3 * late.mean():+.2f} ± {1e3 * late.std():.2f} ms, largest {1e3 * np.abs(late).max():.2f} ms",
+        f" time offset {late.mean():+.2f} ± {late.std():.2f} ms, largest {np.abs(late).max():.2f} ms, its bound"
+        f" {bounds.min():.2f} to {bounds.max():.2f} ms",
         flush=True,
     )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", choices=ROTORS)
+    parser.add_argument("cases", type=int)
+    parser.add_argument("seeds", type=int)
+    parser.add_argument("--instruments", choices=("desired", "second", "smoothed"), default="desired")
+    parser.add_argument("--encoder", type=float, default=ENCODER, help="standard deviation of positions, in [rad]")
+    options = parser.parse_args()
+    main(options.name, options.cases, options.seeds, options.instruments, options.encoder)
