@@ -92,6 +92,7 @@ def identify(
     model, result = estimated(arm, record, cutoff_hz, slow, {} if friction is None else friction.stribeck)
     held_out = _held_out(model, result)
     _refuse_foreign(arm, result, held_out)
+    _refuse_late(result)
     found, r = result.fit, len(model.base.columns)
     theta = nearest_possible(links, model.base.R, found.values[:r], found.covariance[:r, :r])
     parameters = tuple(_parameters(model, found))
@@ -132,11 +133,6 @@ def estimated(
     speed = np.abs(np.gradient(signals.first(log.q), log.step_s, axis=0)).max(axis=0)
     least = numbers("slow", _SLOW * speed if slow is None else slow, (), (arm.n,), error=LogError, least=0)
     found = estimate(model, log, signals, np.broadcast_to(least, (arm.n,)), _refuse(arm))
-    if abs(offset := float(found.fit.values[-1])) >= LATEST_S:
-        raise LogError(
-            f"torques are {'late' if offset > 0 else 'early'} by {1e3 * LATEST_S:g} ms or more; shift their columns in"
-            " time, or log positions and torques by one clock"
-        )
     return model, found
 
 
@@ -211,6 +207,14 @@ def _refuse_foreign(arm: Robot, found: Estimate, held_out: HeldOut) -> None:
         raise LogError(
             f"the torques do not follow the equations of {arm.name}: with the best numbers the held-out error is"
             f" {ratio:.0%} of their deviation; is the log of another arm, or are its columns in another order?"
+        )
+
+
+def _refuse_late(found: Estimate) -> None:
+    if abs(offset := float(found.fit.values[-1])) >= LATEST_S:
+        raise LogError(
+            f"torques are {'late' if offset > 0 else 'early'} by {1e3 * LATEST_S:g} ms or more; shift their columns in"
+            " time, or log positions and torques by one clock"
         )
 
 
