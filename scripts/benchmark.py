@@ -5,9 +5,10 @@ rollouts (against MuJoCo), steps (with an action per lane, over rollouts), param
 over constants), growth (cost against the number of joints), iftomm (problems A01 and A05 of the IFToMM library of
 multibody benchmarks), stiff (joints with stiff dampers and springs), sticking (time stepping of dry friction and stops
 against the event-driven limit, beside MuJoCo), precision (time against error, all methods beside SciPy, MuJoCo, Drake
-and heyoka), energy (of a long run), estimates (of errors, beside true ones), proofs (radius and time of proven runs),
-plans (of motions: beside ruckig, paths at their limits, poses reached, beside pin-pink), sweeps (coverage of the
-intervals of each design). What accuracy costs in other scenes: work_precision.py.
+and heyoka), limits (position limits on and off, beside MuJoCo), energy (of a long run), estimates (of errors, beside
+true ones), proofs (radius and time of proven runs), plans (of motions: beside ruckig, paths at their limits, poses
+reached, beside pin-pink), sweeps (coverage of the intervals of each design). What accuracy costs in other scenes:
+work_precision.py.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from benchmarks import (
     growth,
     iftomm,
     kernels,
+    limits,
     parameters,
     pendulum_sweeps,
     plans,
@@ -49,6 +51,7 @@ SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
     "stiff": (stiff.stiff,),
     "sticking": (sticking.sticking,),
     "precision": (precision.precision,),
+    "limits": (limits.limits,),
     "energy": (energy.energy,),
     "estimates": (estimates.estimates,),
     "proofs": (proofs.proofs,),
