@@ -146,7 +146,7 @@ def _friction(arm: Robot, effects: Iterable[Effect] | str | None) -> Friction | 
             viscous += effect.viscous
         elif isinstance(effect, DryFriction | RegularisedCoulombFriction):
             coulomb += effect.coulomb
-            if isinstance(effect, DryFriction) and effect.stribeck_velocity is not None:
+            if isinstance(effect, DryFriction) and effect.static is not None and effect.stribeck_velocity is not None:
                 excess += np.subtract(effect.static, effect.coulomb)
                 stribeck = dict(enumerate(np.broadcast_to(effect.stribeck_velocity, arm.n).tolist()))
         else:
