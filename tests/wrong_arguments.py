@@ -321,7 +321,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(excited.save, path=folder / "excitation.csv"),
         call(rd.tools.identify.Experiment((("mass", "gain"),), np.ones(1), np.ones(1), states, excited.plan).save,
             path=folder / "motion.csv"),
-        call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, repeat=log, gains=1.0,
+        call(rd.tools.identify.identify, arm=robot, log=log, reference=excited.reference, repeat=None, gains=1.0,
             effects=[rd.effects.ViscousFriction(0.1)], cutoff_hz=6.0, slow=0.05),
         call(rd.tools.identify.payload, arm=robot, log=log, empty=log, link="pole", reference=excited.reference,
             gains=1.0, cutoff_hz=6.0, slow=0.05),

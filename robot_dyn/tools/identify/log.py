@@ -83,8 +83,8 @@ def read_log(
         repeat: A second log of the same motion, instead of desired positions; only its times and positions are read.
 
     Raises:
-        LogError: If positions or torques are missing, a torque is constant or saturated, a joint does not move, or the
-            second log is of another motion.
+        LogError: If positions or torques are missing, a torque is constant or saturated, a joint does not move, the
+            second log is of another motion, or both a desired motion and a second log are given.
         PlanError: If times are missing, or angles look like degrees.
     """
     table, columns, t, q = _positions(arm, source)
@@ -93,6 +93,8 @@ def read_log(
     even = np.arange(t[0], t[-1], float(np.median(np.diff(t))))
     desired = [columns.get(f"desired {joint}") for joint in arm.joint_names]
     along, log = None, Log(even, evenly(t, q, even), evenly(t, tau, even), None)
+    if reference is not None and repeat is not None:
+        raise LogError("give reference, the desired motion, or repeat, a second log of the motion, but not both")
     if reference is not None:
         instance("reference", reference, PiecewisePolynomial, "give the reference of a plan", error=LogError)
         along = reference.at(even)
