@@ -78,7 +78,7 @@ def build(description: Description, edits: Edits) -> Built:
     if model.nv == 0:
         raise DescriptionError(
             f"{description.source}: no joint moves, so the robot has no dynamics;"
-            " make a joint revolute, continuous or prismatic"
+            " make a joint revolute, continuous or prismatic, or add a rigid tool to an arm as an rd.Payload"
         )
     if model.nv > MAX_MOVING:
         raise DescriptionError(

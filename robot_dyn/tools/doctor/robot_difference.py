@@ -107,12 +107,13 @@ class RobotDifference(Answer):
         if self.unmapped:
             groups = dict.fromkeys((x.file, x.obstacle) for x in self.unmapped)
             return f"no torques of {a} and {b} are compared: {'; '.join(self._unmapped(*group) for group in groups)}"
-        row = self.worst
+        row, moved = self.worst, ", ".join(x.a for x in self.joints if (x.sign, x.offset) != (1, 0.0))
+        mapped = f"; this holds with another sign or zero of {moved}, not at equal q" * bool(moved)
         if row is None or row.difference == 0:
-            return f"{a} and {b} need the same torques at rest: no difference of N found"
+            return f"{a} and {b} need the same torques at rest: no difference of N found{mapped}"
         return (
             f"{a} and {b} {'agree' if self.agrees else 'differ'}: the largest difference found of N, the torques at"
-            f" rest, is {abs(row.difference):.3g} {row.unit} at {row.joint}{_of_effort(row)}"
+            f" rest, is {abs(row.difference):.3g} {row.unit} at {row.joint}{_of_effort(row)}{mapped}"
         )
 
     def blocks(self) -> Iterator[Block]:
@@ -134,7 +135,7 @@ class RobotDifference(Answer):
             )
             yield Table(("joint", "value", a, b), rows, right=(a, b))
         else:
-            yield "no masses, centres, moments, axes or limits differ"
+            yield f"no masses, centres, moments, axes or limits differ in the coordinates of {a}"
         if self.largest:
             yield ""
             yield from self._cost()

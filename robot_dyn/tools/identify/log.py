@@ -168,7 +168,10 @@ def _heads(arm: Robot, columns: Mapping[str, str], forms: Sequence[str]) -> dict
         head = next((columns[name] for name in wanted if name in columns), None)
         if head is None:
             near = nearest(wanted[0], columns)
-            raise LogError(f"there is no column {wanted[0]!r}; {near}; the log needs one for each joint: rename it")
+            raise LogError(
+                f"there is no column {wanted[0]!r}; {near}; rename the headings: t [s], and for each joint q {joint},"
+                f" tau {joint} or current {joint}, and desired {joint} if known"
+            )
         heads[joint] = head
     return heads
 

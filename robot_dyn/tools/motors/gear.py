@@ -18,6 +18,7 @@ import numpy as np
 
 from robot_dyn.effects import Causes
 
+_REST = 1e-6  # [rad/s] or [m/s]: slower is rest; planned velocities at rest differ from 0 by rounding
 LOSS = "gear loss"
 """Cause of the torque that the gears take."""
 
@@ -37,8 +38,8 @@ class Gear:
 
     def loss(self, tau: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return τ_motor − τ at velocities v and accelerations a, (..., n)."""
-        through = tau - self.rotor * a
-        return through * (self.efficiency ** -(np.sign(through) * np.sign(v)) - 1)
+        through, direction = tau - self.rotor * a, np.where(np.abs(v) < _REST, 0.0, np.sign(v))
+        return through * (self.efficiency ** -(np.sign(through) * direction) - 1)
 
 
 def with_loss(split: Causes, gear: Gear | None, v: np.ndarray, a: np.ndarray) -> Causes:
