@@ -127,11 +127,8 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
         ends = (motion.breaks[:-1, None] + np.diff(motion.breaks)[:, None] * IMPOSED).ravel()
         largest = float(max(use.largest.max(), limit_use(plant, limits, motion, ends).largest.max()))
         if largest <= _REFUSED and (error <= _ERROR or limits.line is not None):
-            return (
-                motion,
-                use,
-                largest,
-            )  # where a line is steep, its linearisation is off, but the motion is within limits
+            # where a line is steep, its linearisation is off, but the motion is within limits
+            return motion, use, largest
         allowed /= max(1.0, largest)
     remedy = "smoother effects" if limits.line is None else "lines of torque over speed without steep parts"
     raise PlanError(
