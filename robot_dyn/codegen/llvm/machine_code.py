@@ -34,7 +34,7 @@ class Passes:
     Attributes:
         level: Level of the passes over instructions, 0 to 3.
         effort: Level of instruction selection and scheduling, 0 to 3. Above 1, instructions are scheduled a second
-            time, after registers are allocated: that doubles the time of a long block, and its code is no faster.
+            time, after registers are allocated: that doubles the time of a long block without making its code faster.
     """
 
     level: int = 3
