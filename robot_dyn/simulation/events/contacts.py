@@ -122,11 +122,12 @@ def laws_of(equation: StateEquation) -> ContactLaws:
     """
     n, motion = equation.plant.dynamics.n, equation.equation_of_motion
     working: list[Any] = [effect for effect in equation.plant.forces if not isinstance(effect, Conservative)]
-    first_work, first_state = equation.size - len(equation.sources) + 1, 2 * n + equation.state_size
-    gaps = []
-    for k, place in motion.states.items():
-        if isinstance(effect := motion.effects[k], RigidBacklash):
-            gaps.append(_gap_columns(effect, n, first_state + place.start, first_work + working.index(effect)))
+    first_work = equation.size - len(equation.sources) + 1
+    gaps = [
+        _gap_columns(effect, n, place.start, first_work + working.index(effect))
+        for effect in motion.effects
+        if isinstance(effect, RigidBacklash) and (place := equation.place_of(effect)) is not None
+    ]
     columns = [np.concatenate(column) for column in zip(*gaps, strict=True)] if gaps else [np.zeros(0)] * 9
     joints, delta, speed, motors, impulse, work, inertia, half_gap, e = columns
     others = [effect for effect in motion.set_valued if not isinstance(effect, RigidStops)]

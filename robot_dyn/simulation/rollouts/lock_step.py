@@ -150,17 +150,10 @@ class Tiles:
         advance = self.code.machine_loop.calls()
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        position, none = self.positions[tile], np.empty((0, equation.size))
+        position = self.positions[tile]
         position.budget[0] = np.iinfo(np.int64).max
-        records = records_of(
-            rows=self.rows,
-            y=self.out_y,
-            sampled=self.out_extras,
-            shared=none,
-            step_log=none,
-            columns=np.empty((1 + 3 * n, 0)),
-            observation=self.observations[tile],
-        )
+        arrays = self.rows, self.out_y, self.out_extras
+        records = records_of((equation.size, n), *arrays, observation=self.observations[tile])
         config = loop_config(equation, alone=False)._replace(
             largest=LARGEST,
             base=lanes.start,
