@@ -143,7 +143,7 @@ def _saturation(setup: Setup, equation: StateEquation, path: Path) -> Onset:
         return Onset()
     parts = [(setup.controller.thresholds(), lambda u, v: u)]
     parts += [(effect.thresholds(n), effect.limited) for effect in setup.plant.effects if isinstance(effect, Bound)]
-    levels = [(x.joint, abs(x.level), values) for of, values in parts for x in of if x.of_actuation]
+    levels = [(x.joint, abs(x.level), values) for declared, values in parts for x in declared if x.of_actuation]
     if not levels:
         return Onset()
     q, v = equation.motion(path.y)

@@ -136,14 +136,18 @@ class StateEquation(Caching):
         places = self.equation_of_motion.states.items()
         return next((self._place(states) for k, states in places if self.plant.effects[k] is part), None)
 
-    def row(self, part: int | None, of: Threshold | Layer) -> int:
-        """Return the entry of y that a threshold or a layer of an effect concerns; of part None, only of q and v."""
-        if of.state is None or part is None:
-            return of.joint + self.plant.dynamics.n * of.of_velocity
+    def row(self, part: int | None, declared: Threshold | Layer) -> int:
+        """Return the entry of y that a threshold or a layer of part `part` concerns; for None, an entry of q or v.
+
+        Raises:
+            EffectError: If it is a threshold of a state, and the part has no states.
+        """
+        if declared.state is None or part is None:
+            return declared.joint + self.plant.dynamics.n * declared.of_velocity
         if part not in self.equation_of_motion.states:
-            name = of.name if isinstance(of, Threshold) else type(of).__name__
+            name = declared.name if isinstance(declared, Threshold) else "layer"
             raise EffectError(f"{name}: is a threshold of a state, and the part that declares it has none")
-        return self._place(self.equation_of_motion.states[part]).start + of.state
+        return self._place(self.equation_of_motion.states[part]).start + declared.state
 
     def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Return q, v, z, W of y, with z the states of the controller, then of the effects, then the impulses."""

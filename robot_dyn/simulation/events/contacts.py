@@ -16,7 +16,7 @@ from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.contact_mode import ContactLaws, ContactMode, EventWorkspace, Places
 from robot_dyn.simulation.events.event_log import EventKind, event_log
-from robot_dyn.simulation.events.mode_change import REACTIONS, guard_count, rows_of_event, start_mode
+from robot_dyn.simulation.events.mode_change import REACTIONS, guard_count, rows_of_event
 
 _IMPACTS = 64  # that are stored
 _STOP = {-1: "lower stop", 1: "upper stop"}
@@ -43,10 +43,6 @@ class Contacts:
 
     def __init__(self, equation: StateEquation, mode: ContactMode) -> None:
         self.equation, self.mode = equation, mode
-
-    def start(self, y: np.ndarray) -> None:
-        """Write the mode at the start; see `start_mode`."""
-        start_mode(self.mode, y[:, None].copy())
 
     @property
     def mode_of_effects(self) -> Mode:

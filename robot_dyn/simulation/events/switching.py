@@ -45,10 +45,9 @@ class Switching:
         parts = {k: effect.thresholds(n) for k, effect in enumerate(equation.plant.effects)}
         if equation.controller is not None and not equation.sampled:
             parts[CONTROLLER] = equation.controller.thresholds()
-        self._of_part = {k: tuple(x for x in of if self._is_active(k, x)) for k, of in parts.items()}
-        coordinates = dict.fromkeys(
-            (k if x.own else None, x) for k, of in self._of_part.items() for x in of if not x.of_actuation
-        )
+        self._of_part = {k: tuple(x for x in declared if self._is_active(k, x)) for k, declared in parts.items()}
+        active = [(k, x) for k, declared in self._of_part.items() for x in declared]
+        coordinates = dict.fromkeys((k if x.own else None, x) for k, x in active if not x.of_actuation)
         actuation = [(k, x) for k in equation.limited for x in self._of_part[k] if x.of_actuation]
         self.coordinates = len(coordinates)
         self.thresholds: tuple[Threshold, ...] = tuple(x for _, x in (*coordinates, *actuation))
@@ -154,7 +153,7 @@ class Switching:
                 (part, threshold): int(side)
                 for part, threshold, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
-            at = {k: {x: side_of[k if x.own else None, x] for x in of} for k, of in self._of_part.items()}
+            at = {k: {x: side_of[k if x.own else None, x] for x in declared} for k, declared in self._of_part.items()}
             equation, n = self.equation, self._n
             effects: list[Effect] = [
                 effect.on_side(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)

@@ -24,8 +24,7 @@ from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
-from robot_dyn.simulation.rollouts.reasons import states
-from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData, samples_of
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData, states_of
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
@@ -143,9 +142,7 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """Yield the remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    for remark in unstable(
-        setup, *states(setup, *samples_of(runs, run)), bool(runs.diverged[run]), end=runs.ends[run].t
-    ):
+    for remark in unstable(setup, *states_of(runs, run, setup), bool(runs.diverged[run]), end=runs.ends[run].t):
         yield replace(remark, runs=(run,), looked=1)
 
 

@@ -16,11 +16,9 @@ from robot_dyn.codegen.threads import shared
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.integrator import PlainMethod
-from robot_dyn.simulation.compiled.cache import machine_code
-from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.dynamics.loop_state import LaneEnd, lanes_of, loop_config, start_position
 from robot_dyn.simulation.rollouts.batch import Batch
-from robot_dyn.simulation.rollouts.lock_step import LANES, starts
+from robot_dyn.simulation.rollouts.lock_step import LANES, lanes_code, starts
 from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.watch import LARGEST
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -41,10 +39,7 @@ class Periods:
 
     def __init__(self, batch: Batch, inputs: str, threads: int) -> None:
         setup = batch.setup
-        build = partial(
-            machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras, swept=tuple(batch.sweep)
-        )
-        code = checked(setup, build)
+        code = lanes_code(batch)
         self._equation, self._count = code.compiled_form, len(batch)
         equation, n = self._equation, code.compiled_form.plant.dynamics.n
         programs = code.code.programs.values()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -29,13 +28,11 @@ from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, Adaptive
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units
-from robot_dyn.simulation.compiled.cache import machine_code
-from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.results.provenance import joint_types, origin
 from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
-from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
+from robot_dyn.simulation.rollouts.lock_step import Tiles, lanes_code
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
@@ -195,11 +192,9 @@ def run_batch(
     if why or (not uncut and cut and not setup.samples_on_steps):
         record = one_by_one(batch, threads, on_progress)
     else:
-        build = partial(
-            machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras,
-            swept=tuple(batch.sweep), detects=passed is not None and not uncut,
-        )  # fmt: skip
-        record = Tiles(batch, checked(setup, build), None if uncut else passed).run(threads, on_progress)
+        passed_there = None if uncut else passed
+        code = lanes_code(batch, detects=passed_there is not None)
+        record = Tiles(batch, code, passed_there).run(threads, on_progress)
     columns, sources = record.columns, tuple(setup.equation.sources)
     energy, work = columns.get("energy"), columns.get("work")
     return Rollouts(

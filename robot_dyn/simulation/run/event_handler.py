@@ -21,7 +21,7 @@ from robot_dyn.simulation.events.contact_mode import ContactMode, keep_motor_spe
 from robot_dyn.simulation.events.contacts import NO_CONTACT, Contacts, contacts_of
 from robot_dyn.simulation.events.event_log import CHATTER, EventKind, event_log, log_time
 from robot_dyn.simulation.events.event_table import EventTable
-from robot_dyn.simulation.events.mode_change import change_mode
+from robot_dyn.simulation.events.mode_change import change_mode, start_mode
 from robot_dyn.simulation.events.regions import add_region, empty_regions
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.run.event_loop import Events
@@ -59,7 +59,7 @@ class EventHandler:
         if equation.impulses:
             parameters = state.lanes.run_parameters.copy()
             contacts = contacts_of(equation, parameters, state.engine.places(), _MOST_CHANGES, brief)
-            contacts.start(state.start)
+            start_mode(contacts.mode, state.start[:, None].copy())
         is_usual = contacts is None and not state.payloads.any
         self.switching = cached(setup, switching_of) if is_usual else Switching(equation, contacts=contacts)
         if is_usual and not setup.events:
