@@ -120,9 +120,9 @@ def diff_robots(
 ) -> None:
     """Compare two files of one robot: their values, in N m too.
 
-    It prints the map q_b = s q_a + o that the joint axes show, the values that differ, and the largest differences found
-    of N and M. The exit code is 1 if these exceed the tolerance, or if a joint has no counterpart. --lock applies to
-    each file that has the joint, --xacro to xacro files.
+    It prints the map q_b = s q_a + o that the joint axes show, the values that differ, and the largest differences
+    found of N and M. The exit code is 1 if these exceed the tolerance, or if a joint has no counterpart. --lock applies
+    to each file that has the joint, --xacro to xacro files.
 
     Options:
         a (A): A name of `robot-dyn list`, or the path of a URDF, MJCF or xacro file.
