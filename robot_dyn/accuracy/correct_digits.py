@@ -163,4 +163,4 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
 
 def _counted(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
     """Return the digits of one query, counted against its true value."""
-    return digits_of(_exact(robot).at(quantity, state).error(quantity.ask(robot, state)))
+    return digits_of(_exact(robot).at(quantity, state).error(quantity.evaluate(robot, state)))

@@ -210,7 +210,7 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
         frames = [frame] if quantity.framed and frame else []
         if quantity.framed and not frames:
             raise QueryError(f"{name} refers to a frame: add --frame LINK")
-        answers[name] = quantity.ask(state.plant.dynamics, vars(state), *frames)
+        answers[name] = quantity.evaluate(state.plant.dynamics, vars(state), *frames)
     return answers
 
 

@@ -120,7 +120,7 @@ class Engine:
         )
         return False
 
-    def ask(
+    def evaluate(
         self,
         quantity: Key,
         arguments: tuple[ArrayLike, ...],

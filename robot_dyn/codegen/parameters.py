@@ -136,7 +136,7 @@ def _of_part(part: object, place: Part, prefix: str, n: int, path: str = "") -> 
         value = getattr(part, key)
         if value is not None:
             value = np.asarray(value, dtype=float)
-            value = np.broadcast_to(value, (n,)) if coefficient.of_joints else value
+            value = np.broadcast_to(value, (n,)) if coefficient.is_per_joint else value
             yield Parameter(place, path + key, prefix + key, value, coefficient, tuple(range(value.size)))
 
 

@@ -294,7 +294,7 @@ def check_joints(part: object, n: int, where: str = "") -> None:
     """Raise a ControlError if a coefficient of joints is neither one number nor one number for each of n joints."""
     for name, declared_as in declared(type(part)).items():
         shape = np.shape(getattr(part, name))
-        if declared_as.of_joints and shape not in ((), (n,)):
+        if declared_as.is_per_joint and shape not in ((), (n,)):
             raise ControlError(f"{where}{name} must be one number or of shape ({n},), got {shape}")
 
 

@@ -22,7 +22,7 @@ from robot_dyn.foundations.coefficients import (
     with_values,
 )
 from robot_dyn.foundations.errors import ControlError, shown
-from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.foundations.saturation import initial_middle, limit_thresholds, piece, saturated
 from robot_dyn.foundations.threshold import Threshold, smooth
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ class PID(Controller):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "_middle", middle_of(self.effort_limit))
+        object.__setattr__(self, "_middle", initial_middle(self.effort_limit))
         if self.tracking_time_s is None:
             kd, ki = np.broadcast_arrays(self.kd, self.ki)
             acts = (kd > 0) & (ki > 0)
@@ -131,7 +131,7 @@ class PID(Controller):
         return self.effort_limit
 
     def thresholds(self) -> tuple[Threshold, ...]:
-        return limits_reached(self.effort_limit, self._middle, self.n)
+        return limit_thresholds(self.effort_limit, self._middle, self.n)
 
     def on_side(self, sides: Mapping[Threshold, int]) -> PID:
         limit, middle = piece(self.effort_limit, self.n, sides)

@@ -1,4 +1,4 @@
-"""Levels at which an effect or a controller switches between smooth formulas, and layers in which a formula bends."""
+"""Levels at which an effect or controller switches between smooth formulas, and layers in which a formula bends."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Threshold:
         joint: Index of the joint.
         level: Level in [rad] or [m], [rad/s] or [m/s], or [N m] or [N].
         name: Name of the level, such as "upper stop".
-        rising, falling: Events when the coordinate rises or falls through it, such as "touched" and "left".
+        rising, falling: Names of the events when the coordinate rises or falls through it, such as "touched", "left".
         of_velocity: True for a level of the velocity.
-        of_actuation: True for a level of the actuation at the input of a bound, or of a controller's demand.
-        state: Index of the effect's state that passes the level instead of a coordinate of the joint; None for none.
-        slack: Distance past the level at which a position or a velocity counts as past it; rounding is the minimum.
+        of_actuation: True for a level of the actuation before a bound, or of a controller's demand.
+        state: Index of the effect's state that passes the level; None for a coordinate of the joint.
+        slack: Distance beyond the level that counts as past it; never less than rounding.
 
     Raises:
         EffectError: If an attribute has another type, the level is not finite, or it is a level of two coordinates.
@@ -52,7 +52,7 @@ class Threshold:
             truth(name, getattr(self, name), error=EffectError)
         if self.of_velocity + self.of_actuation + (self.state is not None) > 1:
             raise EffectError(
-                f"{self.name}: a threshold has one coordinate; set only one of of_velocity, of_actuation and state"
+                f"{self.name}: a threshold has one coordinate; set at most one of of_velocity, of_actuation and state"
             )
 
     @property
@@ -92,7 +92,7 @@ class Layer:
             integer("state", self.state, most=_MOST, error=EffectError)
         truth("of_velocity", self.of_velocity, error=EffectError)
         if self.of_velocity and self.state is not None:
-            raise EffectError("a layer has one coordinate; set only one of of_velocity and state")
+            raise EffectError("a layer has one coordinate; set at most one of of_velocity and state")
 
 
 def smooth(self: object, n: int = 0) -> tuple[Threshold, ...]:

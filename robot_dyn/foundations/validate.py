@@ -1,6 +1,6 @@
 """Checks of arguments of public functions: real numbers, shape and sign; counts; names; types.
 
-A check returns the argument in one form, or raises the `error` of its caller with one sentence: the requirement and the
+A check returns the argument in one form, or raises the caller's `error` with one sentence: the requirement and the
 value. Time loops skip these checks.
 """
 
@@ -30,7 +30,7 @@ from robot_dyn.foundations.errors import (
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
 JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike]]
-"""Numbers of each joint, (..., n); or by joint name, (...), where joints left out have 0; or a list of such rows."""
+"""Numbers of each joint, (..., n); or by joint name, (...), with 0 for omitted joints; or a list of such rows."""
 Instance = TypeVar("Instance")
 Function = TypeVar("Function")
 LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
@@ -222,12 +222,12 @@ def shaped(
 
     Args:
         label: Name of the argument in messages.
-        values: The argument: an array, or numbers by joint name, of shape (…); joints left out have 0.
+        values: The argument: an array, or numbers by joint name, of shape (…), with 0 for omitted joints.
         joint_names: Names of the n joints.
         arithmetic: An `Arithmetic`; float64 by default.
 
     Raises:
-        QueryError: If they are not real numbers, have another shape, or a name is not that of a joint.
+        QueryError: If they are not real numbers, have another shape, or a joint is unknown.
     """
     n = len(joint_names)
     try:
@@ -244,13 +244,13 @@ def shaped(
 def in_order(
     label: str, values: object, joint_names: Sequence[str] | None, *, fill_value: float = 0.0, error: Kind = QueryError
 ) -> Any:
-    """Return numbers by joint name, or a list of such rows, as an array, (..., n); other values as they are.
+    """Return numbers by joint name, or a list of such rows, as an array, (..., n); other values unchanged.
 
     Args:
         label: Name of the argument in messages.
         values: The argument.
-        joint_names: Names of the n joints, in the order of q; None if the caller was given none.
-        fill_value: Number of joints left out.
+        joint_names: Names of the n joints, in the order of q; None if unknown.
+        fill_value: Number for omitted joints.
         error: Type of the error.
     """
     if isinstance(values, list | tuple) and values and all(isinstance(row, Mapping) for row in values):
@@ -262,9 +262,9 @@ def in_order(
     if not isinstance(values, Mapping):
         return values
     if joint_names is None:
-        raise error(f"{label}: numbers by joint have no order here; give joint_names=, such as arm.joint_names")
+        raise error(f"{label}: numbers by joint name need an order; give joint_names=, for example arm.joint_names")
     if not values:
-        raise error(f"{label}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
+        raise error(f"{label}: no joint is named; give numbers by joint, for example {{{joint_names[0]!r}: 0.1}}")
     for name in values:
         if name not in joint_names:
             raise error(f"{label}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
@@ -305,7 +305,7 @@ def _check_rounding(label: str, exact: np.ndarray, rounded: np.ndarray, joint_na
         place = tuple(np.argwhere(lost)[0])
         joint = "" if label == "t" else f" of joint {joint_names[place[-1]]!r}"
         raise OverflowedError(
-            f"{label}{joint} is so large that {rounded.dtype} does not resolve {LEAST_EXACT:g} rad, m or s, got"
+            f"{label}{joint} is too large for {rounded.dtype} to resolve {LEAST_EXACT:g} rad, m or s, got"
             f" {exact[place]}; use a smaller value, or a dtype with more digits"
         )
 
@@ -382,5 +382,5 @@ def instance(label: str, value: object, kind: UnionType, remedy: str, *, error: 
 def instance(label: str, value: object, kind: type | UnionType, remedy: str, *, error: Kind = QueryError) -> object:
     """Return an object of a type; the remedy in the message describes how to get one."""
     if not isinstance(value, kind):
-        raise error(f"{label}: {remedy}, got {shown(value)}")
+        raise error(f"{label}: got {shown(value)}; {remedy}")
     return value

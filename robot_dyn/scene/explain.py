@@ -16,7 +16,7 @@ from robot_dyn.effects.explanation import (
     Explanation,
     Number,
     Term,
-    as_they_act,
+    acting_coefficients,
     edit_terms,
     explanation,
     term_of,
@@ -91,7 +91,7 @@ def _terms(scene: Scene, setup: Setup) -> Iterator[Term]:
     edited = {term.kind: term.coefficients for term in edit_terms(robot.edits)}  # pyright: ignore
     for effect in scene.effect:
         parts = list(islice(effects, len(effect.build(robot)))) if isinstance(effect, Acting) else []  # pyright: ignore
-        numbers, acting = _numbers(effect), as_they_act(parts, robot)
+        numbers, acting = _numbers(effect), acting_coefficients(parts, robot)
         if isinstance(effect, Edit) and any(number.source == OF_FILE for number in numbers):
             acting = edited.get(effect.kind, ())
         yield Term(effect.kind, term_of(parts) if parts else EDITED[effect.kind], numbers, acting)

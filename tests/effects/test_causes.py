@@ -183,7 +183,7 @@ def test_a_robot_is_a_plant_without_effects_and_an_unknown_joint_has_near_names(
     with pytest.raises(QueryError, match="why: no joint 'elbow'; nearest: elbow_joint"):
         rd.why(arm, q, q, q, "elbow")
     for a, tau in ((None, None), (q, q)):
-        with pytest.raises(QueryError, match="give one of a and tau"):
+        with pytest.raises(QueryError, match="give either a or tau"):
             rd.why(arm, q, q, a, "elbow_joint", tau=tau)
     with pytest.raises(QueryError, match=r"q must be one state of shape \(6,\)"):
         rd.why(arm, np.zeros((2, 6)), q, q, "elbow_joint")

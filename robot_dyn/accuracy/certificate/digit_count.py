@@ -15,7 +15,7 @@ from robot_dyn.accuracy.correct_digits import QUANTITIES, digits_of
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
+from robot_dyn.lagrange.exact import NEGLIGIBLE, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
@@ -80,7 +80,7 @@ def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
     try:
         compiled = CompiledDynamics(robot)
         for quantity in quantities:
-            quantity.ask(compiled, {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")})
+            quantity.evaluate(compiled, {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")})
         served = tuple(quantity for quantity in quantities if compiled.served_by(quantity.name) != "Pinocchio")
         options.append(Implementation("machine code", compiled.robot, compiled, served))
     except (ImportError, RobotDynError) as error:
@@ -251,4 +251,4 @@ def _typical(lagrangian: Lagrangian, states: Batch, quantity: Quantity) -> float
     ratios = evaluate(lagrangian, quantity, states) / entry_units(quantity, evaluate(lagrangian, M, states))
     largest = float(np.nanmax(np.abs(ratios))) or 1.0  # divisor: squares may overflow
     size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
-    return size if size > NOTHING else 1.0
+    return size if size > NEGLIGIBLE else 1.0

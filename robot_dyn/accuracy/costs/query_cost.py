@@ -23,7 +23,7 @@ from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Trace
 from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.model.right_angles import completed
+from robot_dyn.model.right_angles import with_exact_right_angles
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.timing import seconds
 
@@ -47,7 +47,7 @@ class QueryCost:
 
     @cached_property
     def _trace(self) -> Trace:
-        return Trace(completed(self.robot)[0])
+        return Trace(with_exact_right_angles(self.robot)[0])
 
     @cached_property
     def _forward(self) -> dict[str, ca.Function]:
@@ -104,7 +104,7 @@ class QueryCost:
         return differences, self._version("exact", self._quantity(_DERIVATIVES), (3, n, n))
 
     def _right_angles(self) -> tuple[Version, Version]:
-        if not completed(self.robot)[1]:
+        if not with_exact_right_angles(self.robot)[1]:
             raise QueryError("the file states all of them to full precision")
         stated = program_of(Trace(self.robot).quantity(_FORWARD).function)
         return self._version("as stated", stated), self._version("exact", self._best[1])

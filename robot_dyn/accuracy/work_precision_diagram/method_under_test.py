@@ -22,7 +22,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.model.right_angles import completed, models_in_full
+from robot_dyn.model.right_angles import with_exact_models, with_exact_right_angles
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.time_budget import Budget
@@ -216,9 +216,9 @@ def whole(setup: Setup) -> Setup:
 
     Both engines then run the same equations.
     """
-    controller = models_in_full(setup.controller, lambda model: completed(model)[0])
+    controller = with_exact_models(setup.controller, lambda model: with_exact_right_angles(model)[0])
     dynamics = setup.plant.dynamics
-    robot = completed(dynamics)[0] if isinstance(dynamics, Robot) else dynamics
+    robot = with_exact_right_angles(dynamics)[0] if isinstance(dynamics, Robot) else dynamics
     plant = setup.plant if robot is dynamics else Plant(robot, setup.plant.effects)
     return replace(setup, plant=plant, controller=controller)
 

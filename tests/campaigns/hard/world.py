@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.queries import FORWARD_DYNAMICS, M, N
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard import conditioning, far_out, sampled_control, tools
@@ -122,7 +122,7 @@ COLUMNS: tuple[Column, ...] = (implementations, far, rows_of_a_batch, swing, hel
 
 def arm(name: str, seed: int) -> Iterator[Row]:
     """All columns of an arm; a refusal is a figure too."""
-    robot, _ = completed(rd.load(name))
+    robot, _ = with_exact_right_angles(rd.load(name))
     for column in COLUMNS:
         try:
             yield from column(name, robot, seed)
