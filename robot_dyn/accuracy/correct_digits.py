@@ -23,7 +23,7 @@ from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import QUANTITIES as QUERIES
-from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.quantity import MAX_DIGITS, Quantity
 
 QUANTITIES = {name: quantity for name, quantity in QUERIES.items() if quantity.digits}
 
@@ -40,7 +40,7 @@ def _unchecked(robot: Robot) -> Robot:
 
 def digits_of(error: float) -> float:
     """Return −log10 of an error, limited to 0…20; 0 for nan."""
-    return min(max(-log10(max(error, RESOLUTION)), 0.0), float(MOST_DIGITS)) if error == error else 0.0
+    return min(max(-log10(max(error, RESOLUTION)), 0.0), float(MAX_DIGITS)) if error == error else 0.0
 
 
 def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
@@ -111,8 +111,8 @@ class DigitCheck:
 
     def __post_init__(self) -> None:
         digits = number("digits", self.digits, above=0)
-        if digits > MOST_DIGITS:
-            raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}")
+        if digits > MAX_DIGITS:
+            raise QueryError(f"digits must be at most {MAX_DIGITS}, got {digits:g}")
         object.__setattr__(self, "digits", digits)
 
     def __call__(self, robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:

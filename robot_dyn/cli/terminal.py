@@ -20,7 +20,7 @@ from robot_dyn.foundations.errors import RobotDynError, escaped
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-_MOST = 4000  # characters of a message
+_MAX = 4000  # characters of a message
 
 
 class OutputError(RobotDynError):
@@ -132,7 +132,7 @@ def to_stderr(text: str) -> None:
     """Write one line to standard error, if there is one."""
     line = escaped(text)
     try:
-        print(line if len(line) <= _MOST else line[: _MOST - 1] + "…", file=sys.stderr, flush=True)
+        print(line if len(line) <= _MAX else line[: _MAX - 1] + "…", file=sys.stderr, flush=True)
     except OSError:
         _drop(sys.stderr)
 

@@ -10,7 +10,7 @@ from typing import final
 
 from robot_dyn.foundations.validate import integer
 
-_MOST_THREADS = 4096
+_MAX_THREADS = 4096
 
 
 def thread_count(threads: int | None) -> int:
@@ -21,7 +21,7 @@ def thread_count(threads: int | None) -> int:
     """
     if threads is None:
         return os.cpu_count() or 1
-    return integer("threads (None for all processors)", threads, least=1, most=_MOST_THREADS)
+    return integer("threads (None for all processors)", threads, least=1, most=_MAX_THREADS)
 
 
 def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int) -> int:

@@ -73,7 +73,7 @@ class PID(Controller):
         τ = sat(u),   u = kp e + kd ė + z,   ż = ki e + (sat(u) − u)/T_t
 
     so that at a constant error z settles at sat(u) + T_t ki e − kp e − kd ė instead of growing. Sampled, this is stable
-    for period < 2 T_t.
+    if the period is less than 2 T_t.
 
     Attributes:
         reference: q_d(t) of the n joints.
@@ -178,7 +178,8 @@ def gains_from(
     omega = numbers("bandwidth_rad_s", bandwidth_rad_s, *shapes, above=0)
     zeta = numbers("damping_ratio", damping_ratio, *shapes, least=0)
     if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
-        raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
+        shapes_text = f"{inertia.shape}, {omega.shape}, {zeta.shape}"
+        raise ControlError(f"shapes of inertia_diagonal, bandwidth_rad_s, damping_ratio differ: {shapes_text}")
     with np.errstate(over="ignore"):
         kp, kd = inertia * omega**2, 2 * zeta * omega * inertia
     return numbers("kp = M_ii ω²", kp, (), ("n",)), numbers("kd = 2 ζ ω M_ii", kd, (), ("n",))

@@ -92,7 +92,7 @@ class Float(Arithmetic):
 
 FLOAT64 = Float(np.dtype(np.float64))
 
-MOST_BITS = 1_000_000  # largest precision of a ball: a product then takes milliseconds
+MAX_BITS = 1_000_000  # largest precision of a ball: a product then takes milliseconds
 
 # flint has one working precision per process, so only one precision can be in use at a time.
 _flint_turn = RLock()
@@ -111,7 +111,7 @@ class Ball(Arithmetic):
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bits", integer("bits of a Ball", self.bits, least=2, most=MOST_BITS))
+        object.__setattr__(self, "bits", integer("bits of a Ball", self.bits, least=2, most=MAX_BITS))
 
     def number(self, literal: Numeral) -> arb:
         from flint import arb

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ABOUT = "about"
 _LONGEST = 10_000  # largest number of characters in a name
-_MOST = 20  # largest ratio of unpacked to packed bytes; an array of zeros has 1000
+_MAX = 20  # largest ratio of unpacked to packed bytes; an array of zeros has 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
@@ -240,7 +240,7 @@ def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
         raise StoreError(f"a name has a NUL, or more than {_LONGEST} characters; use a shorter one, without NUL")
     ordered: dict[str, Any] = {name: np.asarray(x, order="C") for name, x in arrays.items()}
     np.savez_compressed(stream, **ordered)
-    if sum(x.nbytes for x in ordered.values()) > _MOST / 2 * stream.tell():
+    if sum(x.nbytes for x in ordered.values()) > _MAX / 2 * stream.tell():
         stream.seek(0)
         stream.truncate()
         np.savez(stream, **ordered)
@@ -253,13 +253,13 @@ def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
         StoreError: If the file is damaged or cut short, contains other data, or unpacks to over 20 times its size.
     """
     try:
-        most = _MOST * stream.seek(0, SEEK_END)
+        most = _MAX * stream.seek(0, SEEK_END)
         with zipfile.ZipFile(stream) as file:
             members = {member.filename.removesuffix(".npy"): member for member in file.infolist()}
             if len(members) < len(file.infolist()):
                 raise StoreError("it contains two members with the same name")
             if (size := sum(member.file_size for member in members.values())) > most:
-                raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
+                raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MAX} times its size")
             return {name: _array(file, name, member) for name, member in members.items()}
     except StoreError:
         raise

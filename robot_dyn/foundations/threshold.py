@@ -8,7 +8,7 @@ from typing import final
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.validate import instance, integer, number, truth
 
-_MOST = 10**6  # largest index of a joint or a state
+_MAX = 10**6  # largest index of a joint or a state
 
 
 @final
@@ -41,11 +41,11 @@ class Threshold:
     state: int | None = None
 
     def __post_init__(self) -> None:
-        integer("joint", self.joint, most=_MOST, error=EffectError)
+        integer("joint", self.joint, most=_MAX, error=EffectError)
         object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         object.__setattr__(self, "slack", number("slack", self.slack, least=0, error=EffectError))
         if self.state is not None:
-            integer("state", self.state, most=_MOST, error=EffectError)
+            integer("state", self.state, most=_MAX, error=EffectError)
         for name in ("name", "rising", "falling"):
             instance(name, getattr(self, name), str, "give a text", error=EffectError)
         for name in ("of_velocity", "of_actuation"):
@@ -84,12 +84,12 @@ class Layer:
     state: int | None = None
 
     def __post_init__(self) -> None:
-        integer("joint", self.joint, most=_MOST, error=EffectError)
+        integer("joint", self.joint, most=_MAX, error=EffectError)
         object.__setattr__(self, "width", number("width", self.width, above=0, error=EffectError))
         if self.level is not None:
             object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         if self.state is not None:
-            integer("state", self.state, most=_MOST, error=EffectError)
+            integer("state", self.state, most=_MAX, error=EffectError)
         truth("of_velocity", self.of_velocity, error=EffectError)
         if self.of_velocity and self.state is not None:
             raise EffectError("a layer has one coordinate; set at most one of of_velocity and state")

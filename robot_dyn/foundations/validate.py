@@ -33,7 +33,7 @@ JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[
 """Numbers of each joint, (..., n); or by joint name, (...), with 0 for omitted joints; or a list of such rows."""
 Instance = TypeVar("Instance")
 Function = TypeVar("Function")
-LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
+MAX_ROUNDING_ERROR = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
 _F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # usual types of entries in lists; bool is excluded
 
@@ -286,7 +286,7 @@ def converted(
 
     Raises:
         NotFiniteError: If a number is not finite; the message names the joint.
-        OverflowedError: If rounding changes the position q or the time t by more than LEAST_EXACT.
+        OverflowedError: If rounding changes the position q or the time t by more than MAX_ROUNDING_ERROR.
     """
     dtype = _F8 if arithmetic is None else arithmetic.dtype
     numbers = array
@@ -299,13 +299,13 @@ def converted(
 
 
 def _check_rounding(label: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
-    """Raise an OverflowedError if numbers were rounded and the arithmetic does not resolve LEAST_EXACT there."""
-    far = np.finfo(rounded.dtype).eps * np.abs(rounded) > LEAST_EXACT
+    """Raise an OverflowedError if numbers were rounded and the arithmetic does not resolve MAX_ROUNDING_ERROR there."""
+    far = np.finfo(rounded.dtype).eps * np.abs(rounded) > MAX_ROUNDING_ERROR
     if far.any() and (lost := far & (exact.astype(np.longdouble) != rounded)).any():
         place = tuple(np.argwhere(lost)[0])
         joint = "" if label == "t" else f" of joint {joint_names[place[-1]]!r}"
         raise OverflowedError(
-            f"{label}{joint} is too large for {rounded.dtype} to resolve {LEAST_EXACT:g} rad, m or s, got"
+            f"{label}{joint} is too large for {rounded.dtype} to resolve {MAX_ROUNDING_ERROR:g} rad, m or s, got"
             f" {exact[place]}; use a smaller value, or a dtype with more digits"
         )
 

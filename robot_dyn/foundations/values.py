@@ -23,7 +23,7 @@ Late = TypeVar("Late", bound="Derived")
 Key = TypeVar("Key")
 Item = TypeVar("Item")
 
-_MOST = 64  # largest number of values in a cache by identity
+_MAX = 64  # largest number of values in a cache by identity
 
 
 class Value:
@@ -103,7 +103,7 @@ class LRUByIdentity(Generic[Item]):
             if entry is None or any(ref() is not x for ref, x in zip(entry[0], objects, strict=True)):
                 entry = [weakref.ref(x) for x in objects], compute()
             self._values[key] = entry
-            while len(self._values) > _MOST or any(ref() is None for ref in next(iter(self._values.values()))[0]):
+            while len(self._values) > _MAX or any(ref() is None for ref in next(iter(self._values.values()))[0]):
                 del self._values[next(iter(self._values))]
             return entry[1]
 

@@ -26,7 +26,7 @@ from robot_dyn.integrate.step_control import ControlledStepper, initial_control
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rodas5P", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
-LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
+MIN_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
 
 
 @final
@@ -121,8 +121,8 @@ class Adaptive:
             "atol": number("atol", self.atol, least=0),
             "max_step_s": number("max_step_s", self.max_step_s, above=0, infinite=True),
         }
-        if not LEAST_RTOL < values["rtol"] < 1:
-            raise QueryError(f"rtol must be between {LEAST_RTOL:.3g} and 1, got {self.rtol!r}")
+        if not MIN_RTOL < values["rtol"] < 1:
+            raise QueryError(f"rtol must be between {MIN_RTOL:.3g} and 1, got {self.rtol!r}")
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

@@ -21,15 +21,15 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
-from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.quantity import MAX_DIGITS, Quantity
 
 if TYPE_CHECKING:
     from flint import arb
     from numpy.typing import ArrayLike
 
 
-RESOLUTION = 10.0**-MOST_DIGITS
-_FIRST_BITS, _MOST_BITS = 128, 4096
+RESOLUTION = 10.0**-MAX_DIGITS
+_FIRST_BITS, _MAX_BITS = 128, 4096
 
 NEGLIGIBLE = 1e-12  # in the units of the joints: smaller values are rounding errors of zero
 
@@ -157,10 +157,10 @@ class Exact:
             try:
                 values = np.asarray(quantity.evaluate(engine, state), dtype=object)
                 scale = self._scale(engine, quantity, state, values, typical)
-                if np.all(scale.relative(0 * midpoint(values), radius(values)) <= RESOLUTION) or bits >= _MOST_BITS:
+                if np.all(scale.relative(0 * midpoint(values), radius(values)) <= RESOLUTION) or bits >= _MAX_BITS:
                     return Truth(values, scale, bits)
             except UndecidedError:
-                if bits >= _MOST_BITS:
+                if bits >= _MAX_BITS:
                     raise
             bits *= 2
 

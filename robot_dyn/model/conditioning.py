@@ -18,11 +18,11 @@ import numpy as np
 from robot_dyn.foundations.errors import SingularError, UndecidedError
 from robot_dyn.queries.dynamics import acceleration
 
-LEAST_DIGITS = 8  # M counts as nearly singular if forward dynamics has fewer digits
+MIN_DIGITS = 8  # M counts as nearly singular if forward dynamics has fewer digits
 
 
 class NearlySingular(NamedTuple):
-    """Facts about an M with which forward dynamics has fewer digits than LEAST_DIGITS.
+    """Facts about an M with which forward dynamics has fewer digits than MIN_DIGITS.
 
     Attributes:
         condition: Condition number κ.
@@ -72,6 +72,6 @@ def _nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingu
     u = np.finfo(float).eps / 2
     condition = float(eigenvalues[-1] / max(eigenvalues[0], u * eigenvalues[-1]))
     digits = float(-np.log10(u * condition))
-    if digits >= LEAST_DIGITS:
+    if digits >= MIN_DIGITS:
         return None
     return NearlySingular(condition, max(digits, 0.0), joint_names[int(np.argmax(np.abs(vectors[:, 0])))])

@@ -22,7 +22,7 @@ from robot_dyn.description.other_programs import ARMATURE, STIFFNESS, of_coordin
 from robot_dyn.description.structure import StatedLink, Structure, stands_on, structure_of
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
-from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
+from robot_dyn.model.conditioning import MIN_DIGITS, NearlySingular, Regularity
 
 LONGEST = 1e4  # [m]; also for multipliers of mimic joints: sums with such a length have rounding errors of 1e-12 m
 LIGHTEST = 1e-12  # [kg]
@@ -134,7 +134,7 @@ def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
         yield (
             f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so forward dynamics may have only"
             f" {near.digits:.0f} correct digits; correct the inertia it moves, or add armature (queries warn below"
-            f" {LEAST_DIGITS} digits; rd.accuracy.warn_below(robot, None) turns this off)"
+            f" {MIN_DIGITS} digits; rd.accuracy.warn_below(robot, None) turns this off)"
         )
 
 

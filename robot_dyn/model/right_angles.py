@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 # With fewer decimals, the intended angle would be a guess, and the change large enough to show in a cross-check.
-_LEAST_DECIMALS = 9
+_MIN_DECIMALS = 9
 _FULL = 15  # decimals that need no change
 
 
@@ -103,7 +103,7 @@ def _written_out(description: Description) -> tuple[Description, tuple[RightAngl
 def _completed(literal: str) -> str:
     mantissa, _, exponent = literal.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
-    if exponent or not _LEAST_DECIMALS <= decimals < _FULL:
+    if exponent or not _MIN_DECIMALS <= decimals < _FULL:
         return literal
     angle = float(literal)
     right = round(angle / (math.pi / 2)) * (math.pi / 2)

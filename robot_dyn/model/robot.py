@@ -52,7 +52,7 @@ from robot_dyn.foundations.local_ascent import search_box
 from robot_dyn.foundations.validate import JointValues, function, instance, is_moderate, is_plain, is_state, numbers
 from robot_dyn.foundations.values import Caching, OnFirstUse
 from robot_dyn.model.calls import Scratch
-from robot_dyn.model.conditioning import LEAST_DIGITS
+from robot_dyn.model.conditioning import MIN_DIGITS
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of, zero_efforts
@@ -412,7 +412,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         regularity = self._evaluation.regularity
         if regularity.singular or not regularity.near:
             return self
-        return replace(self, answer_check=resolve_name(_CHECK_OF_NEARLY_SINGULAR)(LEAST_DIGITS))
+        return replace(self, answer_check=resolve_name(_CHECK_OF_NEARLY_SINGULAR)(MIN_DIGITS))
 
     @takes_changes
     def with_(self, **changes: Unpack[Changes]) -> Robot:

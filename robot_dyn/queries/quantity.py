@@ -15,7 +15,7 @@ from robot_dyn.foundations.arithmetic import Scalar
 from robot_dyn.queries.units import of_joint
 
 DOUBTFUL = 1e10  # ‖a‖ above which M may be singular at this q, hidden by rounding
-MOST_DIGITS = 20  # maximum number of digits counted
+MAX_DIGITS = 20  # maximum number of digits counted
 
 State = Mapping[str, Scalar]
 Key = str | tuple[str, ...]  # name of a query, or (name, link) or (name, link, axes) of a query of a frame

@@ -63,7 +63,7 @@ def test_r_follows_a_constant_torque_in_closed_form() -> None:
 def test_tick_by_tick_and_over_the_log_are_equal() -> None:
     """Equal formulas on one machine's states; M v is a difference of terms of 20 N m, over h of 2 ms: 1e-11."""
     law, run = pushed(2e-3)
-    log = external_torque(ARM, run.t, run.q, run.v, run.u, bandwidth_rad_s=K, held=True)
+    log = external_torque(ARM, run.t, run.q, run.v, run.u, bandwidth_rad_s=K, zero_order_hold=True)
     np.testing.assert_allclose(log.torque, law.recorded(run.t, run.controller_states).torque, atol=1e-11)
 
 

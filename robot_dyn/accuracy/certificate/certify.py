@@ -36,7 +36,7 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import M
-from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.quantity import MAX_DIGITS, Quantity
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.result import INTERRUPTED, Result
@@ -314,7 +314,7 @@ def _count_and_time(
         except QueryError as error:
             left_out.append(str(error))
     bits = digit_count.truth(digit_count.robot, quantity, state).bits
-    name, most = f"balls, {bits} bits", float(MOST_DIGITS)
+    name, most = f"balls, {bits} bits", float(MAX_DIGITS)
     calls[name] = _call(Lagrangian(digit_count.robot, Ball(bits)), quantity, state)
     at_state = None if digit_count.state is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}

@@ -40,9 +40,9 @@ _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
 _MORE = 1.1  # ratio of steps: if smaller, stability rather than accuracy chose the steps
 _ABOVE = 10.0  # times the reference error: below this, an error is partly that of the reference
 RECORDS = 25  # approximate number of times at which errors are evaluated
-_MOST_RECORDS = 400  # limit where records must fall on switching times
+_MAX_RECORDS = 400  # limit where records must fall on switching times
 _ON_TIME = 1e-9  # fraction of the record period: times that differ by less are equal
-_MOST_STEPS = 10**8
+_MAX_STEPS = 10**8
 _HIGH = 5  # from this order on, doubling the steps leaves gaps in a ladder
 _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # steps per record period in runs that load machine code
@@ -242,7 +242,7 @@ def _record_period(setup: Setup, duration_s: float) -> float:
     times = [Fraction(str(t)) for t in (tick or duration_s, *inside)]
     unit = lcm(*(t.denominator for t in times))
     parts = Fraction(gcd(*(int(t * unit) for t in times)), unit)  # the longest time that divides all
-    if duration_s > _MOST_RECORDS * parts:
+    if duration_s > _MAX_RECORDS * parts:
         parts = Fraction(str(duration_s))  # only records that happen to be ends of steps count
     return float(parts) / ceil(RECORDS * float(parts) / duration_s)
 
@@ -287,7 +287,7 @@ def at_setting(setup: Setup, setting: float) -> Setup:
 
 def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
     """Return steps from the record period downwards, while a run does not exceed the number of steps allowed."""
-    before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # beyond MOST_CUT events end no steps
+    before, most = 0, MOST_CUT if events and switches(setup) else _MAX_STEPS  # beyond MOST_CUT events end no steps
     for step in step_ladder(setup.record_every_s, order):
         count = at_setting(setup, step).steps
         if count > most:

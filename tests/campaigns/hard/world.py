@@ -26,7 +26,7 @@ from tests.campaigns.hard.case import Case, Row
 
 TITLE = "The world"
 MATRIX = True
-MOST_JOINTS, SWING_S, HELD_S = 12, 0.3, 1.0
+MAX_JOINTS, SWING_S, HELD_S = 12, 0.3, 1.0
 LEAST = 0.3  # part of the true error that an estimate has to be
 ARMS = [
     "a1", "anymal_b", "anymal_c", "b1", "bolt", "borinot_flying_arm_2", "cart_pole", "double_pendulum",
@@ -135,7 +135,7 @@ def left_out(seed: int) -> Iterator[Row]:
     there = []
     for name in rd.list_robots():
         with suppress(RobotDynError):  # what is refused is in docs/reference/findings.md
-            there += [name] * (rd.load(name).n <= MOST_JOINTS)
+            there += [name] * (rd.load(name).n <= MAX_JOINTS)
     yield Row("the catalog", "arms that are left out", float(len(set(there) - set(ARMS))), 0.0)
 
 
