@@ -148,8 +148,8 @@ def external_torque(
             gravity only.
         rest_s: Interval (from, to) without contact and motion, in [s]; the mean external torque in it is the offset,
             which is subtracted. None for no offset.
-        zero_order_hold: True if each torque acts until the next sample, like commands of a controller; False if they are
-            samples of a sensor.
+        zero_order_hold: True if each torque acts until the next sample, like commands of a controller; False if
+            torques are samples of a sensor.
 
     Raises:
         ControlError: If an array has the wrong shape or unit, times do not increase, or the arm moves in `rest_s`.

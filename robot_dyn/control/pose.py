@@ -132,8 +132,8 @@ def inverse_kinematics(
     counts as much as 1 m.
 
     A direction instead of a rotation leaves the spin about the tool axis free: for arms with five axes, and for tools
-    that may spin, such as torches. Other software calls this the mask (1, 1, 1, 1, 1, 0) in tool axes, or a tolerance of
-    π about the z axis. None instead of a rotation is the mask (1, 1, 1, 0, 0, 0): position-only inverse kinematics.
+    that may spin, such as torches. Other software calls this the mask (1, 1, 1, 1, 1, 0) in tool axes, or a tolerance
+    of π about the z axis. None instead of a rotation is the mask (1, 1, 1, 0, 0, 0): position-only inverse kinematics.
 
     Args:
         arm: The robot.

@@ -67,7 +67,7 @@ class DryFriction(SetValued):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.stribeck_velocity is not None and self.static is None:
-            raise EffectError("stribeck_velocity has no effect without the static friction `static`; give both")
+            raise EffectError("stribeck_velocity has no effect without static, the static friction; give both")
         require("static must not be less than coulomb", np.greater_equal, self.static, self.coulomb)
 
     @property

@@ -179,7 +179,7 @@ def changed(row: int, joint: int, x: float) -> np.ndarray:
         (
             table(REST) | {"t": 1000 * T + 0.5},
             {},
-            "no joint reaches 1 % of its speed limit in 2000 s, .*are the times in ms",
+            "no joint reaches 1 % of its velocity limit in 2000 s, .*are the times in ms",
         ),
         (table(REST) | {"t": T + (T > 1)}, {}, r"1 gap in time, the longest of 1\.025 s from 1 s"),
         (
@@ -203,7 +203,7 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (table(np.degrees(SMOOTH)), {}, "angles look like degrees: shoulder_pan_joint reaches 48"),
+        (table(np.degrees(SMOOTH)), {}, "angles may be in degrees: shoulder_pan_joint reaches 48"),
         (
             table(np.where(np.arange(6) == 2, np.degrees(SMOOTH), SMOOTH)),
             {},

@@ -194,7 +194,7 @@ LOG = dict(zip(("t", "q", "v", "tau"), smooth_log(m=11), strict=True))
     ("change", "message"),
     [
         ({"arm": "ur5"}, "arm"),
-        ({"t": LOG["t"][::-1]}, "t must be at least two times, each later"),
+        ({"t": LOG["t"][::-1]}, "t must have at least two increasing times"),
         ({"v": LOG["v"][1:]}, r"v must .* \(11, 2\)"),
         ({"bandwidth_rad_s": 0.0}, "bandwidth_rad_s must be above 0|bandwidth_rad_s"),
         ({"effects": 3.0}, "effects"),

@@ -171,8 +171,8 @@ def refuse_moving_ends(table: Recorded) -> None:
     """Raise a PlanError if joints move at the ends of dense samples: stopping in one step would need large torques."""
     for end in _ends(table):
         raise PlanError(
-            f"{end}; give ends='measured' if the samples are part of a longer motion, or ends='rest' if the motion stops"
-            " there (--ends on the command line)"
+            f"{end}; give ends='measured' if the samples are part of a longer motion, or ends='rest' if the motion"
+            " stops there (--ends on the command line)"
         )
 
 
