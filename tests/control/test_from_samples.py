@@ -101,7 +101,7 @@ def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
 
 def test_samples_that_move_at_an_end_need_a_word() -> None:
     """A stop within one step would take a torque that the motion does not need."""
-    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start.*choose .*ends='measured'.*ends='rest'"):
+    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start.*give ends='measured'.*ends='rest'"):
         rd.control.from_samples(ARM, table(SMOOTH))
     with pytest.raises(PlanError, match=r"at the end of the samples: choose"):
         rd.control.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
@@ -124,7 +124,7 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
     (found,) = [
         x for x in rd.control.from_samples(ARM, noisy[kept], time=T[kept], ends="rest").findings if "noise" in x
     ]
-    said = re.search(r"noise or rounding of (\S+) rad, or inexact times, cause accelerations of (\S+) rad", found)
+    said = re.search(r"noise or rounding of (\S+) rad, or inexact times, causes accelerations of (\S+) rad", found)
     assert said is not None and float(said[1]) == pytest.approx(deviation, rel=0.5)
     assert not kept.all() or float(said[2]) == pytest.approx(np.sqrt(6) * deviation / T[1] ** 2, rel=0.35)
     assert "noise" not in " ".join(rd.control.from_samples(ARM, REST[kept], time=T[kept], ends="rest").findings)
@@ -221,7 +221,7 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
         (dict(zip(NAMES, REST.T, strict=True)), {}, "there is no column of time; known: shoulder"),
         (table(REST), {"joints": {"elbow": "elbow_joint"}}, "no joint 'elbow'; nearest: elbow_joint"),
         (table(REST), {"ends": "still"}, "no ends 'still'"),
-        ({f"{n} [deg]" if n != "t" else n: x for n, x in table(REST).items()}, {"unit": "rad"}, "states another unit"),
+        ({f"{n} [deg]" if n != "t" else n: x for n, x in table(REST).items()}, {"unit": "rad"}, "states a unit other"),
         (
             {f"{n} [turns]" if n != "t" else n: x for n, x in table(REST).items()},
             {},
