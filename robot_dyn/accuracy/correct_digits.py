@@ -1,7 +1,7 @@
 """Correct digits of an answer, −log10(error), counted against true values in balls.
 
 An error is relative to the scale of the answer, in the units √M_ii of the joints (`lagrange.exact`). Before digits are
-counted it is estimated, as 8 n u κ times the ratio of the terms of the answer to the answer (`lagrange.magnitude`).
+counted, the error is estimated as 8 n u κ times the ratio of the answer's terms to the answer (`lagrange.magnitude`).
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
     requested = QUANTITIES[choice("quantity", quantity, QUANTITIES)]
     if len(state) != len(requested.arguments):
         raise QueryError(
-            f"digits of {requested.name} need the arguments {', '.join(requested.arguments)}; got {len(state)}"
-            f" arguments"
+            f"digits of {requested.name} need the arguments {', '.join(requested.arguments)}, got {len(state)}"
+            " arguments"
         )
     arrays = {
         name: np.array(shaped(name, x, robot.joint_names), float)
@@ -92,7 +92,7 @@ def warn_below(robot: Robot, digits: float | None) -> Robot:
     Raises:
         QueryError: If an argument is invalid.
     """
-    robot = instance("robot", robot, Robot, "give one of rd.load")
+    robot = instance("robot", robot, Robot, "give a robot, for example rd.load('ur5')")
     if digits is None:
         return robot if robot.answer_check is None else replace(robot, answer_check=None)
     return replace(robot, answer_check=DigitCheck(digits))
@@ -104,7 +104,7 @@ class DigitCheck:
     """A check of answers that warns of too few correct digits.
 
     Attributes:
-        digits: The number of digits below which it warns.
+        digits: Number of digits below which it warns.
     """
 
     digits: float

@@ -256,7 +256,7 @@ def _literal(values: Any) -> Any:
 
 
 def with_numbers(dynamics: Dynamics, values: Mapping[str, Scalar]) -> Dynamics:
-    """Return the robot of a dynamics with other numbers; the dynamics itself without any."""
+    """Return the robot of a dynamics object with other numbers; the object itself if there are none."""
     if not values:
         return dynamics
     robot: Any = getattr(dynamics, "robot", dynamics)

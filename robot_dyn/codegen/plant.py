@@ -180,7 +180,7 @@ class CompiledPlant(SuggestsNames):
 
     @cached_property
     def _rigid(self) -> Dynamics[np.ndarray]:
-        """Rigid bodies; raises a TraceError if a payload comes or goes."""
+        """Rigid bodies; raises a TraceError if a payload is picked up or dropped."""
         _ = self._symbolic
         return self.dynamics.nan_rows if self.is_nan_allowed else self.dynamics
 

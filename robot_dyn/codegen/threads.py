@@ -1,4 +1,4 @@
-"""Work shared by threads: a free thread takes the next piece, so that a slow one delays no other."""
+"""Work shared by threads: each free thread takes the next piece, so that slow threads do not delay others."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int
 
 @final
 class _Pool:
-    """Pool of waiting threads, as many as were ever needed at once; starting one takes as long as a thousand states."""
+    """Pool of waiting threads, because starting a thread takes as long as evaluating a thousand states."""
 
     def __init__(self) -> None:
         self._lock, self._size, self._threads = threading.Lock(), 0, ThreadPoolExecutor(1)

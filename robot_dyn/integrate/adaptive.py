@@ -39,7 +39,7 @@ class Solution:
         states: y at these times, shape (k, m).
         evaluations: Number of evaluations of the rate, including those for Jacobians and dense output.
         status: Status at the end of the run.
-        message: Description of the status in a sentence, with time and remedy if the run failed.
+        message: The status in a sentence, with time and remedy if the run failed.
     """
 
     times: np.ndarray
@@ -144,7 +144,7 @@ class Adaptive:
             stop: Optional function of (t, y); the run stops where it first changes sign.
 
         Returns:
-            The solution up to the end of the run. If the run fails, it has the steps until then, and status FAILED.
+            The solution up to the end of the run. If the run fails, it contains the steps before, with status FAILED.
 
         Raises:
             QueryError: If y0, t0 or t1 is not valid, or the method is auto.

@@ -3,8 +3,8 @@
     k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ_i b_i k_i,    Pₛ(2 c_i − 1) = 0
 
 They preserve every quadratic invariant, and the energy of a Hamiltonian system in (q, p) up to a bounded O(h²ˢ). The
-stage iteration continues until rounding dominates: an earlier end is a systematic error, and energy drifts. [Hairer,
-Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, IV.2.1, VI.4 and VIII.6]
+stage iteration continues until rounding dominates: ending it earlier is a systematic error that makes energy drift.
+[Hairer, Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, IV.2.1, VI.4 and VIII.6]
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class GaussLegendre(PlainMethod):
     def not_found(self, t: Scalar, h: Scalar) -> IntegrationError:
         return IntegrationError(
             f"{self.name}: the stages of the step {float(h)} at t = {float(t)} do not converge in "
-            f"{MAX_ITERATIONS} iterations: use a smaller step, or a method for stiff systems",
+            f"{MAX_ITERATIONS} iterations; use a smaller step, or a method for stiff systems",
             t,
         )
 

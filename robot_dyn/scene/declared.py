@@ -92,7 +92,7 @@ def declared_part(
     for key, (name, form) in keys.items():
         default = parameters[name].default
         default = (URDF if form.stated else ...) if default is Parameter.empty else default
-        none = f"; joints left out have {'none' if isinf(form.fill_value) else f'{form.fill_value:g}'}"
+        none = f"; omitted joints have {'none' if isinf(form.fill_value) else f'{form.fill_value:g}'}"
         none = none if form.fill_value else ""
         fields[key] = (_type(form), Field(default, description=f"{form.symbol}{none}."))
     text = text or (getdoc(factory) or kind).partition("\n\nAttributes:")[0]

@@ -42,8 +42,8 @@ _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 def explain(system: Setup | Plant | Dynamics | str | Path) -> Explanation:
     """Explain the equation of motion: its terms, the effects with their coefficients, and effects not simulated.
 
-    The `repr` of the result are the lines that `robot-dyn explain` prints, `to_json()` is the document of
-    `robot-dyn explain --json`. For a scene file it includes the source of each number.
+    The `repr` of the result is the text that `robot-dyn explain` prints, and `to_json()` returns the document of
+    `robot-dyn explain --json`. For a scene file both include the source of each number.
 
     Args:
         system: A setup, a plant, a robot, or the path of a scene file.

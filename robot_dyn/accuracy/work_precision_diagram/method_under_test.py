@@ -157,7 +157,7 @@ class ToleranceLadder(Method):
         errors = np.maximum([p.error for p in finite], self.floor)
         errors = np.maximum.accumulate(errors[::-1])[::-1]
         times = np.array([p.time_s for p in finite])
-        times = np.minimum.accumulate(times[::-1])[::-1]  # a finer run that took less serves as well
+        times = np.minimum.accumulate(times[::-1])[::-1]  # a finer run that took less time counts, too
         reached = np.flatnonzero(errors <= error)
         if len(reached):
             i = int(reached[0])
@@ -248,7 +248,7 @@ def _record_period(setup: Setup, duration_s: float) -> float:
 
 
 def common(t: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return the index of each time t in the ascending times `of`; −1 for a time that is not among them."""
+    """Return the index of each time t in the ascending `times`; −1 for a time that is not among them."""
     place = np.clip(np.searchsorted(times, t - _ON_TIME * times[-1] / len(times)), 0, len(times) - 1)
     return np.where(np.abs(times[place] - t) <= _ON_TIME * times[-1], place, -1)
 
@@ -286,7 +286,7 @@ def at_setting(setup: Setup, setting: float) -> Setup:
 
 
 def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
-    """Return steps from the record period downwards, while a run does not exceed the number of steps allowed."""
+    """Yield steps from the record period downwards, as long as a run has no more steps than allowed."""
     before, most = 0, MOST_CUT if events and switches(setup) else _MAX_STEPS  # beyond MOST_CUT events end no steps
     for step in step_ladder(setup.record_every_s, order):
         count = at_setting(setup, step).steps

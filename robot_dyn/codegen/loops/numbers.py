@@ -40,7 +40,7 @@ _RELATIONS: Mapping[type[ast.cmpop], str] = MappingProxyType(
 
 
 def scalar(f: Function, value: Value, node: ast.AST) -> Scalar:
-    """Return a value that is a number; refuse any other."""
+    """Return the value if it is a number; otherwise raise the error."""
     if not isinstance(value, Scalar):
         raise f.refused(
             node, "an operation on a value that is not a number", "write it entry by entry, or with a primitive"
