@@ -187,7 +187,7 @@ def test_a_robot_is_a_plant_without_effects_and_an_unknown_joint_has_near_names(
             rd.why(arm, q, q, a, "elbow_joint", tau=tau)
     with pytest.raises(QueryError, match=r"q must be one state of shape \(6,\)"):
         rd.why(arm, np.zeros((2, 6)), q, q, "elbow_joint")
-    with pytest.raises(QueryError, match="plant: got .*; give the plant of a robot"):
+    with pytest.raises(QueryError, match=r"plant: got .*; give the plant of a robot"):
         rd.why(rd.Plant(rd.Lagrangian(arm)), q, q, q, "elbow_joint")
 
 

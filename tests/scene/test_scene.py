@@ -115,7 +115,7 @@ DECLARED: dict[str, Any] = {kind: part for kind, part in BY_KIND.items() if kind
 
 def stated(value: Any, known: Any, form: str) -> tuple[str, Any]:
     """A value of an example in TOML: as it is, or by joint, some joints left out; and the value that this means."""
-    if form == "as it is" or not isinstance(value, list) or not known.of_joints:
+    if form == "as it is" or not isinstance(value, list) or not known.is_per_joint:
         return json.dumps(value), value
     required = known.exclusive_minimum is not None and known.fill_value <= known.exclusive_minimum
     joints = [0, 1] if required or form == "by joint" else [int(np.argmax(np.abs(value)))]

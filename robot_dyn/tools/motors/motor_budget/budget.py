@@ -127,7 +127,7 @@ def of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, limits:
         )
     demand = of_motion(reference, plant, limits)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
-    findings = [*robot.announced_findings, *(() if plan is None else plan.findings), *outside]
+    findings = [*robot.announced_findings, *limits.findings, *(() if plan is None else plan.findings), *outside]
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):
         findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(
@@ -146,7 +146,7 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     cut = frozenset(remark.joint for remark in run.remarks if remark.kind in _CUT)
     joints = tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), cut))
     reported = *_CUT, RemarkKind.COARSE
-    findings = remark_lines(remark for remark in run.remarks if remark.kind in reported)
+    findings = [*limits.findings, *remark_lines(remark for remark in run.remarks if remark.kind in reported)]
     if run.outcome.ending == Ending.STOPPED:
         findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget covers the simulated part")
     left = ["torque at which joints break away: a run does not contain its static friction"]
@@ -219,7 +219,7 @@ def _budget(
         limits=limits,
         resolution=demand.resolution,
         error=demand.error,
-        findings=(*findings, *not_judged),
+        findings=tuple(dict.fromkeys((*findings, *not_judged))),
         left_out=tuple(left_out),
         environment=processor_and_versions(("robot-dyn", "pin", "numpy")),
         demand=demand,
