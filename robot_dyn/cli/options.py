@@ -28,6 +28,7 @@ from robot_dyn.foundations.errors import ModelWarning, QueryError
 from robot_dyn.foundations.files import target
 
 if TYPE_CHECKING:
+    from robot_dyn.description.edits import Changes
     from robot_dyn.model.robot import Robot
 
 Name = Annotated[
@@ -104,10 +105,12 @@ class RobotOptions(FileOptions):
     Options:
         lock (JOINT=VALUE): Lock a joint at a value in rad or m; may be repeated.
         without (WHAT,…): Parts left out of MJCF: tendon, equality, free, ball.
+        gravity (X,Y,Z): Gravity in base axes, in m/s²; 0,0,9.81 on a ceiling.
     """
 
     lock: Annotated[list[str] | None, typer.Option(autocompletion=completion.locks)] = None
     without: str | None = None
+    gravity: str | None = None
 
     def load(self, name: str, *, quiet: bool = False) -> Robot:
         """Return the robot of a name or path; `quiet` suppresses its warnings."""
@@ -120,7 +123,12 @@ class RobotOptions(FileOptions):
                 warnings.simplefilter("ignore", ModelWarning)
             inertia = "from_shapes" if estimated else "stated"
             robot = rd.load(name, inertia=inertia, without=without, **self.reading)
-        return robot.with_(lock=arguments.assignments("--lock", self.lock)) if self.lock else robot
+        changes: Changes = {}
+        if self.gravity is not None:
+            changes["gravity"] = arguments.vector("--gravity", self.gravity, ("x", "y", "z"))
+        if self.lock:
+            changes["lock"] = arguments.assignments("--lock", self.lock)
+        return robot.with_(**changes) if changes else robot
 
 
 @final

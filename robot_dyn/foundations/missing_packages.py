@@ -11,12 +11,11 @@ import sys
 # Modules of required packages; `extras.needs` imports modules of extras.
 _REQUIRED = {
     "PIL", "casadi", "collada", "flint", "llvmlite", "lxml", "matplotlib", "meshcat", "pinocchio", "platformdirs",
-    "pydantic", "pydantic_core", "rich", "scipy", "tornado", "trimesh", "typer", "umsgpack", "yourdfpy", "zmq",
+    "pydantic", "pydantic_core", "rich", "scipy", "trimesh", "typer", "yourdfpy",
 }  # fmt: skip
 # Distributions whose names differ from their modules.
 _DISTRIBUTIONS = {
     "PIL": "pillow", "collada": "pycollada", "flint": "python-flint", "pinocchio": "pin", "pydantic_core": "pydantic",
-    "umsgpack": "u-msgpack-python", "zmq": "pyzmq",
 }  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from robot_dyn.foundations.errors import (
 
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
-JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike]]
+JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike] | ArrayLike]
 """Numbers of each joint, (..., n); or by joint name, (...), where joints left out have 0; or a list of such rows."""
 Instance = TypeVar("Instance")
 Function = TypeVar("Function")
@@ -244,7 +244,7 @@ def shaped(
 def in_order(
     label: str, values: object, joint_names: Sequence[str] | None, *, fill_value: float = 0.0, error: Kind = QueryError
 ) -> Any:
-    """Return numbers by joint name, or a list of such rows, as an array, (..., n); other values as they are.
+    """Return numbers by joint name, or a list with such rows, as an array, (..., n); other values as they are.
 
     Args:
         label: Name of the argument in messages.
@@ -253,16 +253,20 @@ def in_order(
         fill_value: Number of joints left out.
         error: Type of the error.
     """
-    if isinstance(values, list | tuple) and values and all(isinstance(row, Mapping) for row in values):
-        rows = [
-            in_order(f"{label}[{i}]", row, joint_names, fill_value=fill_value, error=error)
-            for i, row in enumerate(values)
-        ]
-        return np.stack(_one_shape(label, dict(enumerate(rows)), error))
-    if not isinstance(values, Mapping):
+    rows = values if isinstance(values, list | tuple) else ()
+    if not isinstance(values, Mapping) and not any(isinstance(row, Mapping) for row in rows):
         return values
     if joint_names is None:
-        raise error(f"{label}: numbers by joint have no order here; give joint_names=, such as arm.joint_names")
+        raise error(f"{label}: numbers by joint name have no order here; give joint_names=arm.joint_names")
+    if rows:
+        arrays = {
+            i: in_order(f"{label}[{i}]", row, joint_names, fill_value=fill_value, error=error)
+            if isinstance(row, Mapping)
+            else numbers(f"{label}[{i}]", row, (len(joint_names),), error=error)
+            for i, row in enumerate(rows)
+        }
+        return np.stack(_one_shape(label, arrays, error))
+    assert isinstance(values, Mapping)
     if not values:
         raise error(f"{label}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
     for name in values:

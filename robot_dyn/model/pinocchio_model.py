@@ -78,7 +78,8 @@ def build(description: Description, edits: Edits) -> Built:
     if model.nv == 0:
         raise DescriptionError(
             f"{description.source}: no joint moves, so the robot has no dynamics;"
-            " make a joint revolute, continuous or prismatic, or add a rigid tool to an arm as an rd.Payload"
+            " make a joint revolute, continuous or prismatic, or attach a rigid tool to an arm by its path:"
+            " arm.attach('tool.urdf', frame='tool0')"
         )
     if model.nv > MAX_MOVING:
         raise DescriptionError(

@@ -60,6 +60,7 @@ from robot_dyn.model.from_pinocchio import described
 from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, robot_line
 from robot_dyn.model.newton_euler import JointWrenches, NewtonEuler, joint_wrenches
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
+from robot_dyn.model.reading import read_file
 from robot_dyn.model.remarks import no_torque
 from robot_dyn.model.to_urdf import write_urdf
 from robot_dyn.queries.batch import into
@@ -406,9 +407,14 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         """
         return Robot(*described(model)).announced()
 
-    def announced(self) -> Robot:
-        """Warn of `announced_findings`, and return the robot with warnings of its queries if M is nearly singular."""
-        announce(self.name, self.announced_findings, len(self.findings))
+    def announced(self, *, known: tuple[str, ...] = ()) -> Robot:
+        """Warn of `announced_findings`, and return the robot with warnings of its queries if M is nearly singular.
+
+        Args:
+            known: Findings of which there was a warning before.
+        """
+        new = [finding for finding in self.announced_findings if finding not in known]
+        announce(self.name, new, len({*self.findings} - {*known}))
         regularity = self._evaluation.regularity
         if regularity.singular or not regularity.near:
             return self
@@ -441,7 +447,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return robot if self.answer_check is None else replace(robot, answer_check=self.answer_check)
 
     def attach(
-        self, gripper: Robot, *, frame: str, prefix: str = "", xyz: ArrayLike = (0.0, 0.0, 0.0),
+        self, gripper: Robot | str | Path, *, frame: str, prefix: str = "", xyz: ArrayLike = (0.0, 0.0, 0.0),
         rpy: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Robot:  # fmt: skip
         """Return this arm with a gripper, whose root is fixed to a link of the arm.
@@ -449,7 +455,8 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         Edits of both are kept. The joints of the gripper have its names with the prefix; `joint_names` has their order.
 
         Args:
-            gripper: A robot with a fixed base, with any number of joints, for example from `rd.load("gripper.urdf")`.
+            gripper: A robot with a fixed base, for example from `rd.load("gripper.urdf", xacro={})`; or a name or path
+                as in `load`, where a tool without moving joints is allowed.
             frame: Link of the arm that carries it, for example "tool0".
             prefix: Text before the names of links and joints of the gripper, for example "g_".
             xyz: Position of the gripper's root in the frame, (3,) in [m].
@@ -458,12 +465,20 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         Raises:
             EditError: If there is no such link, a name occurs in both robots, the base of the gripper moves, or gravity
                 of the gripper was changed.
+            CatalogError: If there is no such file.
+            DescriptionError: If the file is refused.
+
+        Warns:
+            ModelWarning: Once, if the file of the gripper adds findings.
         """
-        instance("gripper", gripper, Robot, "give a robot, for example rd.load('gripper.urdf')", error=EditError)
+        from_file = not isinstance(gripper, Robot)
+        instance("gripper", gripper, Robot | str | Path, "give a robot, or the path of its file", error=EditError)
+        tool, of_tool = read_file(gripper) if from_file else (gripper.description, gripper.edits)
         place = (numbers(name, value, (3,), error=EditError) for name, value in (("xyz", xyz), ("rpy", rpy)))
-        description = attached(self.description, gripper.description, frame, prefix, *place)
-        edits = attached_edits(self.edits, gripper.edits, gripper.description, prefix)
-        return Robot(description, edits, self.answer_check or gripper.answer_check)
+        description = attached(self.description, tool, frame, prefix, *place)
+        edits = attached_edits(self.edits, of_tool, tool, prefix)
+        robot = Robot(description, edits, self.answer_check or (None if from_file else gripper.answer_check))
+        return robot.announced(known=self.findings) if from_file else robot
 
     def to_urdf(self, path: str | Path) -> Path:
         """Write the robot with its edits as a URDF; an existing file is replaced.

@@ -53,7 +53,8 @@ def from_samples(
 
     Args:
         arm: The robot.
-        source: Path of a CSV file, a data frame, columns by heading in a dict, or an array (m, n) in the order of q.
+        source: Path of a CSV file, a data frame, columns by heading in a dict, an array (m, n) in the order of q, or a
+            list of states, also by joint name, 0 for joints left out.
             Headings are names of joints, with or without a unit, such as "elbow_joint [deg]", or the headings of
             `run.save`, such as "q elbow_joint [rad]". Or the path of an MCAP log (.mcap) with ROS 2 messages
             sensor_msgs/msg/JointState that name the joints; this needs the extra "data".

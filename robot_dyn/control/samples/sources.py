@@ -17,7 +17,7 @@ from robot_dyn.control.samples.other_files import refuse_other_files
 from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of
 from robot_dyn.foundations.errors import PlanError, shorten, shown
 from robot_dyn.foundations.files import csv_rows
-from robot_dyn.foundations.validate import numbers
+from robot_dyn.foundations.validate import in_order, numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -37,7 +37,9 @@ class DataFrame(Protocol):
 
 
 if TYPE_CHECKING:
-    Source = str | Path | ArrayLike | Mapping[str, ArrayLike] | DataFrame
+    from robot_dyn.foundations.validate import JointValues
+
+    Source = str | Path | JointValues | DataFrame
 
 _MOST_BYTES = 2**28
 _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
@@ -72,7 +74,8 @@ def table_of(
         except Exception:  # a ragged list, or any error in the conversion of an object
             raise PlanError(f"samples: columns must be arrays of one length, got {shown(source)}") from None
     else:
-        rows = numbers("samples", source, ("m", len(joint_names)), error=PlanError)
+        states = in_order("samples", source, joint_names, error=PlanError)
+        rows = numbers("samples", states, ("m", len(joint_names)), error=PlanError)
         columns = dict(zip(joint_names, rows.T, strict=True))
     if by_name and time in TIMES and time not in columns:
         raise PlanError(f"time={time!r} applies to MCAP logs only; remove it")

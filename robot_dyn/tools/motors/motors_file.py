@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import inf, pi
 from pathlib import Path
 from typing import Any, final
@@ -49,8 +49,9 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "efficiency": {"": 1.0, "%": 0.01},
 }
 _BEARING = tuple(name for name in _UNITS if name.startswith("bearing_"))
-_ONCE = "at", "gear_ratio", "rotor_inertia", "efficiency", "brake", *_BEARING  # in the first line of a joint
 _OF_CORNERS = "speed", "peak", "continuous"  # may be 0 at a corner
+_OF_FIRST = "at", "gear_ratio", "rotor_inertia", "efficiency", "brake", *_BEARING  # stated once for a joint
+_LEAST_RATIO, _LEAST_EFFICIENCY, _BRAKES = 0.5, 0.05, 20.0  # smaller ones, and brakes that differ more, are mistakes
 
 
 @final
@@ -122,8 +123,9 @@ def read_motors(path: str | Path) -> Motors:
 
     Raises:
         PlanError: If the file cannot be read, a column or unit is unknown, an entry is not a positive number, corners
-            are not a torque–speed line, a speed above 100 rad/s is at the joint, or an efficiency is above 1 or of
-            torques at the joint.
+            are not a torque–speed line, a continuous torque exceeds the peak, a speed above 100 rad/s is at the joint,
+            a gear ratio is below 0.5, a brake and a peak differ by more than a factor of 20, or an efficiency is above
+            1, below 0.05, or of torques at the joint.
     """
     lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …", skip_blank=True)
     heads = _heads(path, next(lines)[1])
@@ -135,18 +137,9 @@ def read_motors(path: str | Path) -> Motors:
         raise PlanError(f"{path}: contains no motors; add a line for each joint")
     rows = [_motor(joint) for joint in corners.values()]
     columns = {
-        key: {row["joint"]: row[key] for row in rows if row.get(key)}
-        for key in (
-            "peak",
-            "continuous",
-            "speed",
-            "armature",
-            "line",
-            "continuous_line",
-            "efficiency",
-            "brake",
-            "bearing",
-        )
+        column.name: {row["joint"]: row[column.name] for row in rows if row.get(column.name)}
+        for column in fields(Motors)
+        if column.name != "source"
     }
     return Motors(**columns, source=str(path))
 
@@ -181,39 +174,15 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return torques, speed and lines at the joint, and the inertia of the rotor there, of the lines of a joint."""
     first, where, joint = rows[0], rows[0]["where"], rows[0]["joint"]
     at, ratio = first["at"] or AT[0], first.get("gear_ratio", 1.0)
-    for row in rows[1:]:
-        if other := next(
-            (x for x in _ONCE if row.get(x, "") not in ("", first.get(x))),
-            "",
-        ):
-            raise PlanError(f"{row['where']}: {joint!r} has another {other} in its first line; keep that one")
     if at not in AT:
         raise PlanError(f"{where}: at must be joint or motor, got {shorten(at)!r}")
-    if "gear_ratio" not in first and (at == "motor" or "rotor_inertia" in first):
-        subject = "values at the motor need" if at == "motor" else "a rotor_inertia needs"
-        raise PlanError(f"{where}: {subject} a gear_ratio; give 1 without a gear")
-    if (efficiency := first.get("efficiency", 1.0)) > 1:
-        raise PlanError(f"{where}: efficiency must be at most 1, got {efficiency:g}; write percent as 'efficiency [%]'")
-    if "efficiency" in first and at != "motor":
-        raise PlanError(
-            f"{where}: torques at the joint contain the losses of the gear; leave efficiency empty, or state torques at"
-            " the motor"
-        )
     for row in rows:
-        for name in (x for x in _UNITS if row.get(x) == 0 and (len(rows) == 1 or x not in _OF_CORNERS)):
-            raise PlanError(f"{row['where']}: {name} must be a positive number, got 0")
-        if len(rows) > 1 and "speed" not in row:
-            raise PlanError(
-                f"{row['where']}: joint {shorten(joint)!r} appears twice; keep one line, or give a speed in each: they"
-                " are the corners of its torque–speed line"
-            )
-        if at == "joint" and "speed" in row:
-            check_speed(f"{row['where']}: speed", row["speed"], PlanError)
+        _check(row, first, at, is_corner=len(rows) > 1)
     N = ratio if at == "motor" else 1.0
     motor = {name: N * first[name] for name in ("peak", "continuous", "brake") if name in first}
     motor["bearing"] = {name.removeprefix("bearing_"): first[name] for name in _BEARING if name in first}
     motor |= {"joint": joint, "armature": ratio**2 * first.get("rotor_inertia", 0.0)}
-    motor |= {"efficiency": efficiency} if efficiency < 1 else {}
+    motor |= {"efficiency": first["efficiency"]} if first.get("efficiency", 1.0) < 1 else {}
     if "speed" in first:
         motor["speed"] = rows[-1]["speed"] / N
     for name, line in (("peak", "line"), ("continuous", "continuous_line")):
@@ -223,6 +192,53 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             check_line(f"{where}: {name} of {joint}", speed, torque, PlanError)
             motor |= {line: tuple(corners), name: corners[0][1]}
     return motor
+
+
+def _check(row: Mapping[str, Any], first: Mapping[str, Any], at: str, *, is_corner: bool) -> None:
+    """Raise a PlanError for a mistake in a line of a joint, whose first line is `first`."""
+    joint, efficiency, ratio = row["joint"], row.get("efficiency", 1.0), row.get("gear_ratio", 1.0)
+    peak = row.get("peak", inf)
+    continuous, brake = row.get("continuous", 0.0), row.get("brake", peak)
+    other = [name for name in _OF_FIRST if row.get(name, "") not in ("", first.get(name))]
+    zero = [name for name in _UNITS if row.get(name) == 0 and not (is_corner and name in _OF_CORNERS)]
+    mistakes = (
+        (other, f"{joint!r} has another {', '.join(other)} in its first line; keep that one"),
+        (zero, f"{', '.join(zero)} must be a positive number, got 0"),
+        (
+            is_corner and "speed" not in row,
+            f"joint {shorten(joint)!r} appears twice; keep one line, or give a speed in each: they are the corners of"
+            " its torque–speed line",
+        ),
+        (
+            "gear_ratio" not in first and (at == "motor" or "rotor_inertia" in first),
+            "values at the motor and a rotor_inertia need a gear_ratio; give 1 without a gear",
+        ),
+        (
+            ratio < _LEAST_RATIO,
+            f"gear_ratio is the speed of the motor over that of the joint, got {ratio:.4g}; write its reciprocal",
+        ),
+        (efficiency > 1, f"efficiency must be at most 1, got {efficiency:.4g}; write percent as 'efficiency [%]'"),
+        (
+            efficiency < _LEAST_EFFICIENCY,
+            f"efficiency {efficiency:.4g} leaves almost no torque; write 80 % as 0.8, or as 80 in 'efficiency [%]'",
+        ),
+        (
+            "efficiency" in row and at != "motor",
+            "torques at the joint contain the losses of the gear; leave efficiency empty, or state torques at the"
+            " motor",
+        ),
+        (continuous > peak, f"the continuous torque {continuous:.4g} exceeds the peak {peak:.4g}; correct one of them"),
+        (
+            0 < peak < inf and not 1 / _BRAKES <= brake / peak <= _BRAKES,
+            f"the brake, {brake:.4g}, and the peak, {peak:.4g}, differ by more than a factor of {_BRAKES:g}; give both"
+            f" at the {at}",
+        ),
+    )
+    for is_made, mistake in mistakes:
+        if is_made:
+            raise PlanError(f"{row['where']}: {mistake}")
+    if at == "joint" and "speed" in row:
+        check_speed(f"{row['where']}: speed", row["speed"], PlanError)
 
 
 def _number(name: str, text: str) -> float:

@@ -130,7 +130,7 @@ def of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, limits:
     assert demand.cells is not None
     bearings = bearing_loads.of_plan(demand.cells, plant, limits.bearing)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
-    findings = [*robot.announced_findings, *(() if plan is None else plan.findings), *outside]
+    findings = [*robot.announced_findings, *limits.findings, *(() if plan is None else plan.findings), *outside]
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):
         findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(
@@ -150,7 +150,8 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     bearings = bearing_loads.of_run(run, robot, limits.bearing)
     joints = tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), bearings, cut))
     reported = *_CUT, RemarkKind.COARSE
-    findings = [*remark_lines(remark for remark in run.remarks if remark.kind in reported), *bearings.findings]
+    remarks = remark_lines(remark for remark in run.remarks if remark.kind in reported)
+    findings = [*limits.findings, *remarks, *bearings.findings]
     if run.outcome.ending == Ending.STOPPED:
         findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget covers the simulated part")
     left = ["torque at which joints break away: a run does not contain its static friction"]
@@ -224,7 +225,7 @@ def _budget(
         limits=limits,
         resolution=demand.resolution,
         error=demand.error,
-        findings=(*findings, *not_judged),
+        findings=tuple(dict.fromkeys((*findings, *not_judged))),
         left_out=tuple(left_out),
         environment=processor_and_versions(("robot-dyn", "pin", "numpy")),
         demand=demand,

@@ -135,7 +135,7 @@ def joint_budgets(
     delivered, regenerated = (demand.duration_s * demand.mean(x.clip(0.0)) for x in (power, -power))
     at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
     parts = {cause: demand.mean(torque * split.tau) for cause, torque in split.torques.items()}
-    by_joint = [[(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i] for i in row]
+    by_joint = [[(abs(tau), t) for joint, t, tau, *_ in zip(*demand.starts, strict=True) if joint == i] for i in row]
     starts = [max(torques, key=itemgetter(0), default=(nan, nan)) for torques in by_joint]
     values: dict[str, Sequence[float] | np.ndarray] = {
         "peak": demand.peak,
