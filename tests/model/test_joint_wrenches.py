@@ -13,7 +13,7 @@ from robot_dyn.effects import Force
 from robot_dyn.foundations import DescriptionError, QueryError
 from robot_dyn.foundations.arithmetic import apply
 from robot_dyn.model.newton_euler import JointWrenches
-from robot_dyn.simulation.results.joint_wrenches import COUNTED
+from robot_dyn.simulation.results.joint_wrenches import KNOWN_ON_LINKS
 from tests.effect_examples import EFFECTS
 from tests.user_parts import Push
 
@@ -227,7 +227,7 @@ def test_impacts_at_stops_are_in_no_sample() -> None:
 
 def test_every_effect_of_the_library_acts_at_joints_or_on_links() -> None:
     forces = {kind.name for kind in EFFECTS.values() if issubclass(kind, Force)}
-    assert forces - COUNTED <= {"line_spring_damper"}
+    assert forces - KNOWN_ON_LINKS <= {"line_spring_damper"}
 
 
 def test_effects_with_unknown_forces_on_links_are_refused() -> None:
