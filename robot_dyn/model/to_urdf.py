@@ -73,19 +73,19 @@ def _not_stated(edits: Edits) -> list[str]:
 
 
 def _fix_locked(out: Any, values: dict[str, float]) -> None:
-    """Make locked joints and their followers fixed, and reduce chains of followers to single steps."""
+    """Make locked joints and their followers fixed, and let followers of followers refer to the first joint."""
     mimics = stated_mimics(out)
     for joint in out.iterfind("joint"):
         name, mimic = joint.get("name"), joint.find("mimic")
         source, ratio, offset = resolve(name, mimics, FLOAT64)
         if source in values and joint.get("type") != "fixed":
-            _hold(joint, ratio * values[source] + offset)
+            _fix(joint, ratio * values[source] + offset)
         elif mimic is not None and mimic.get("joint") != source:
             for key, value in (("joint", source), ("multiplier", repr(float(ratio))), ("offset", repr(float(offset)))):
                 mimic.set(key, value)
 
 
-def _hold(joint: Any, value: float) -> None:
+def _fix(joint: Any, value: float) -> None:
     """Make a joint fixed at a value."""
     origin, axis = joint.find("origin"), _numbers(joint.find("axis").get("xyz"))
     axis, R, p = axis / np.linalg.norm(axis), rotation_rpy(_numbers(origin.get("rpy"))), _numbers(origin.get("xyz"))
