@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
+from robot_dyn.integrate.adaptive import MIN_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.imbalance import finer
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
@@ -136,7 +136,7 @@ def _by_refinement(
     if run.events:
         halves = np.setdiff1d(halves, [event.t for event in run.events], assume_unique=True)
     tight = None
-    if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
+    if estimated.kink < np.inf and method.rtol / 10 > MIN_RTOL:
         tenth = method.with_tolerances(0.1, method.max_step_s)
         tight = runner.run(with_values(setup, {"method": tenth})).shared  # the other values were checked
     halved = runner.run(setup, halves).shared

@@ -14,7 +14,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
 from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.loop_state import Functions, Lanes, LoopConfig, Position, erase_ended
-from robot_dyn.simulation.observation.observation import NOTHING, Observation, observe
+from robot_dyn.simulation.observation.observation import UNOBSERVED, Observation, observe
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 
@@ -122,7 +122,7 @@ def records_of(
     shared: int = 0,
     steps: int = 0,
     columns: Array | None = None,
-    observation: Observation = NOTHING,
+    observation: Observation = UNOBSERVED,
 ) -> Records:
     """Return records in these arrays.
 

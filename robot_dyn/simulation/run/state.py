@@ -14,7 +14,7 @@ from robot_dyn.simulation.dynamics.loop_state import LoopConfig, lanes_of, loop_
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.events.payload_events import PayloadEvents
-from robot_dyn.simulation.observation.observation import NOTHING
+from robot_dyn.simulation.observation.observation import UNOBSERVED
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.recording import Loop, Records, records_of
 from robot_dyn.simulation.run.watch import Watch
@@ -63,7 +63,7 @@ class RunState:
     def allocate(self, config: LoopConfig, samples: int, shared: int, steps: int) -> None:
         """Set the settings of the loop and allocate its records: rows of samples, shared states and ends of steps."""
         n, m, observer = config.n, self.equation.size, self.observer
-        columns, observation = (None, NOTHING) if observer is None else (observer.columns, observer.observation)
+        columns, observation = (None, UNOBSERVED) if observer is None else (observer.columns, observer.observation)
         y, sampled = np.empty((samples, m, 1)), np.empty((samples, m + n + 2, 1))
         records = records_of((m, n), np.arange(m), y, sampled, shared, steps, columns, observation)
         self.config = config
