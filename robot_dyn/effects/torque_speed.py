@@ -104,7 +104,7 @@ class TorqueSpeed:
 def check_line(name: str, speed: np.ndarray, torque: np.ndarray, error: type[RobotDynError]) -> None:
     """Raise an error unless the speeds of a polyline increase, and its torques do not."""
     if np.shape(speed) != np.shape(torque):
-        raise error(f"{name}: there are {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
+        raise error(f"{name}: got {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
     if not torque[0] > 0:
         raise error(f"{name}: torque must begin with a positive value, got {torque[0]:g}")
     step = np.diff(speed)

@@ -49,6 +49,7 @@ class Limits:
         line: Peak torque of driving motors by speed; None for none.
         continuous_line: Continuous torque by the mean speed of a motion; None for none.
         brake: Holding torque of brakes by joint, in [N m] or [N].
+        bearing: Largest loads on bearings by joint and load.
         gear: Gears with losses, so that torque limits are those of motors; None for none.
         findings: Doubtful limits, with remedies.
     """
@@ -60,6 +61,7 @@ class Limits:
     line: TorqueSpeed | None = None
     continuous_line: TorqueSpeed | None = None
     brake: Mapping[str, float] = field(default_factory=dict)
+    bearing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gear: Gear | None = None
     findings: tuple[str, ...] = ()
 
@@ -133,6 +135,7 @@ def limits_of(
         limits = replace(
             limits,
             brake=motors.brake,
+            bearing=motors.bearing,
             gear=_gear(motors, robot),
             line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
             continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),
@@ -222,7 +225,7 @@ def same_rotor(one: float, other: float) -> bool:
 
 def _check_joints(motors: Motors, robot: Any) -> None:
     """Raise a PlanError if a joint is unknown, or a rotor is not part of the arm: its torque would be missing."""
-    for joint in (*motors.peak, *motors.continuous, *motors.speed, *motors.brake):
+    for joint in (*motors.peak, *motors.continuous, *motors.speed, *motors.brake, *motors.bearing):
         if joint not in robot.joint_names:
             raise PlanError(f"{motors.source}: no joint {shown(joint)}; {nearest(joint, robot.joint_names)}")
     armatures = dict(zip(robot.joint_names, getattr(robot, "armature", np.zeros(robot.n)), strict=True))
