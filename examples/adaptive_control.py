@@ -59,5 +59,7 @@ wrong = controller.guess + run.controller_states - theta
 V = (np.einsum("mi,mij,mj->m", s, arm.M(run.q), s) + (wrong**2).sum(axis=1) / adaptation) / 2
 spent = np.trapezoid((damping * s**2).sum(axis=1), run.t)
 error = np.abs(run.tracking_error).max(axis=1)
-print(f"error at most {error[run.t < 2].max():.4f} rad in the first 2 s, {error[run.t > 8].max():.4f} rad in the last 2 s")
+print(
+    f"error at most {error[run.t < 2].max():.4f} rad in the first 2 s, {error[run.t > 8].max():.4f} rad in the last 2 s"
+)
 print(f"V falls by {V[0] - V[-1]:.6f} J; the integral of sᵀ K s is {spent:.6f} J")

@@ -18,7 +18,15 @@ ROOT = Path(__file__).parents[1]
 LOOP = (ROOT / "docs" / "how_to" / "a_real_control_loop.md").read_text(encoding="utf-8")
 PAGES = {page.stem: page for page in sorted((ROOT / "examples").glob("*.py"))}
 TEXTBOOK = sorted((ROOT / "examples" / "textbook").glob("*.py"))
-TESTED = {"adaptive_control", "pendulum", "double_pendulum", "planar_2r_arm", "panda_computed_torque", "ur5_circle", "panda_payload"}
+TESTED = {
+    "adaptive_control",
+    "pendulum",
+    "double_pendulum",
+    "planar_2r_arm",
+    "panda_computed_torque",
+    "ur5_circle",
+    "panda_payload",
+}
 
 
 def test_every_page_is_tested_and_fits_a_screen() -> None:
