@@ -41,6 +41,7 @@ class Limits:
         line: Peak torque of driving motors by speed; None for none.
         continuous_line: Continuous torque by the mean speed of a motion; None for none.
         brake: Holding torque of brakes by joint, in [N m] or [N].
+        bearing: Largest loads on bearings by joint and load.
         gear: Gears with losses, so that torque limits are those of motors; None for none.
         findings: Doubtful limits, with remedies.
     """
@@ -52,6 +53,7 @@ class Limits:
     line: TorqueSpeed | None = None
     continuous_line: TorqueSpeed | None = None
     brake: Mapping[str, float] = field(default_factory=dict)
+    bearing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gear: Gear | None = None
     findings: tuple[str, ...] = ()
 
@@ -125,6 +127,7 @@ def limits_of(
         limits = replace(
             limits,
             brake={name: x for name, x in motors.brake.items() if name in robot.joint_names},
+            bearing={name: x for name, x in motors.bearing.items() if name in robot.joint_names},
             gear=_gear(motors, robot),
             line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
             continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),

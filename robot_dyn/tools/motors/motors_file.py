@@ -7,6 +7,7 @@ Torques and speeds are at the joint, or at the motor shaft if the column `at` is
 the torque and divides the speed. A rotor adds the inertia ratio² · rotor_inertia at the joint. A joint with several
 lines has a motor whose torques fall with speed: each line is a corner of its torque–speed line, see `Motors.line`.
 A column `efficiency` states the losses of gears, for torques at the motor, and `brake` the holding torque of a brake.
+Columns `bearing axial [N]` and others limit the loads on the bearing of the joint.
 [Siciliano et al. 2009, sec. 5.2]
 """
 
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import inf, pi
 from pathlib import Path
 from typing import Any, final
@@ -29,6 +30,7 @@ _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")
 # units of columns with their factors, including units of prismatic joints
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0}
+_FORCE, _MOMENT = {"N": 1.0}, {"N m": 1.0, "Nm": 1.0}
 _SPEED = {"rad/s": 1.0, "m/s": 1.0, "rpm": pi / 30, "deg/s": pi / 180}
 _INERTIA = {"kg m^2": 1.0, "kg m²": 1.0, "kg": 1.0, "kg cm^2": 1e-4, "kg cm²": 1e-4, "g cm^2": 1e-7, "g cm²": 1e-7}
 _UNITS: Mapping[str, Mapping[str, float]] = {
@@ -37,13 +39,18 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "peak": _TORQUE,
     "continuous": _TORQUE,
     "brake": _TORQUE,
+    "bearing_axial": _FORCE,
+    "bearing_radial": _FORCE,
+    "bearing_tilting": _MOMENT,
+    "bearing_torsion": _MOMENT,
     "speed": _SPEED,
     "gear_ratio": {"": 1.0},
     "rotor_inertia": _INERTIA,
     "efficiency": {"": 1.0, "%": 0.01},
 }
+_BEARING = tuple(name for name in _UNITS if name.startswith("bearing_"))
 _OF_CORNERS = "speed", "peak", "continuous"  # may be 0 at a corner
-_OF_FIRST = "at", "gear_ratio", "rotor_inertia", "efficiency", "brake"  # stated once for a joint
+_OF_FIRST = "at", "gear_ratio", "rotor_inertia", "efficiency", "brake", *_BEARING  # stated once for a joint
 _LEAST_RATIO, _LEAST_EFFICIENCY, _BRAKES = 0.5, 0.05, 20.0  # smaller ones, and brakes that differ more, are mistakes
 
 
@@ -66,6 +73,8 @@ class Motors:
         efficiency: η of the gear, above 0 and at most 1: driving motors supply 1/η of the torque through the gear, and
             motors that are driven back supply η of it. Joints without a value have gears without losses.
         brake: Holding torque of a brake, in [N m] or [N]; joints without a value have no brake.
+        bearing: Largest "axial" and "radial" force, in [N], "tilting" moment and "torsion", in [N m], that a bearing
+            bears; loads left out have no limit.
     """
 
     peak: Mapping[str, float]
@@ -77,6 +86,7 @@ class Motors:
     continuous_line: Mapping[str, Points] = field(default_factory=dict)
     efficiency: Mapping[str, float] = field(default_factory=dict)
     brake: Mapping[str, float] = field(default_factory=dict)
+    bearing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def limit(self) -> TorqueSpeedLimit:
@@ -101,14 +111,15 @@ def read_motors(path: str | Path) -> Motors:
     """Read the motors of a CSV file; the first line names the columns, with units in brackets.
 
     Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], efficiency,
-    brake [N m], at. All except `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and
-    [m/s]; speeds may be in [rpm] or [deg/s], efficiencies in [%]. `at` is "joint" or "motor", the place of torques and
-    speeds; it is required with gear ratios. An efficiency needs torques at the motor: those at the joint contain the
-    loss.
+    brake [N m], at; and bearing axial [N], bearing radial [N], bearing tilting [N m], bearing torsion [N m]. All except
+    `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and [m/s]; speeds may be in
+    [rpm] or [deg/s], efficiencies in [%]. `at` is "joint" or "motor", the place of torques and speeds, but not of loads
+    on bearings; it is required with gear ratios. An efficiency needs torques at the motor: those at the joint contain
+    the loss.
 
     Several lines of one joint are the corners of its torque–speed line, with increasing speeds and peaks that do not
     increase; those with a continuous torque are the corners of a second line. The first states at, gear, rotor,
-    efficiency and brake.
+    efficiency, brake and bearing.
 
     Raises:
         PlanError: If the file cannot be read, a column or unit is unknown, an entry is not a positive number, corners
@@ -126,8 +137,9 @@ def read_motors(path: str | Path) -> Motors:
         raise PlanError(f"{path}: contains no motors; add a line for each joint")
     rows = [_motor(joint) for joint in corners.values()]
     columns = {
-        key: {row["joint"]: row[key] for row in rows if row.get(key)}
-        for key in ("peak", "continuous", "speed", "armature", "line", "continuous_line", "efficiency", "brake")
+        column.name: {row["joint"]: row[column.name] for row in rows if row.get(column.name)}
+        for column in fields(Motors)
+        if column.name != "source"
     }
     return Motors(**columns, source=str(path))
 
@@ -168,6 +180,7 @@ def _motor(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         _check(row, first, at, is_corner=len(rows) > 1)
     N = ratio if at == "motor" else 1.0
     motor = {name: N * first[name] for name in ("peak", "continuous", "brake") if name in first}
+    motor["bearing"] = {name.removeprefix("bearing_"): first[name] for name in _BEARING if name in first}
     motor |= {"joint": joint, "armature": ratio**2 * first.get("rotor_inertia", 0.0)}
     motor |= {"efficiency": first["efficiency"]} if first.get("efficiency", 1.0) < 1 else {}
     if "speed" in first:
