@@ -25,6 +25,8 @@ slope, damping, adaptation = 5.0, np.array([20.0, 10.0]), 10.0  # Λ in [1/s], K
 
 @dataclass(frozen=True, eq=False)
 class SlotineLi(rd.control.Controller):
+    """The law above; its states are the change of the estimate."""
+
     model: rd.Robot
     reference: rd.control.PiecewisePolynomial
     guess: np.ndarray  # θ̂(0), (20,)
