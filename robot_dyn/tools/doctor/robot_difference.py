@@ -247,12 +247,10 @@ def diff_robots(
         if not isinstance(values, Mapping | None):
             raise QueryError(f"{label} must be values by joint of a, such as {{'joint_1': …}}, got {shown(values)}")
     names = matched_names(a, b, joints or {})
-    plain = names if truth("same_q", same_q) else ()
-    of_signs, of_offsets = (
-        dict.fromkeys(plain, 1.0) | dict(signs or {}),
-        dict.fromkeys(plain, 0.0) | dict(offsets or {}),
-    )
-    laid, unmapped = laid_bodies(a, b, names, of_signs, of_offsets)
+    signs, offsets = dict(signs or {}), dict(offsets or {})
+    if truth("same_q", same_q):
+        signs, offsets = dict.fromkeys(names, 1.0) | signs, dict.fromkeys(names, 0.0) | offsets
+    laid, unmapped = laid_bodies(a, b, names, signs, offsets)
     maps = tuple(body.map for body in laid)
     largest, order, differences = (), (), [*_of_robot(a, b), *_of_bodies(a, b, laid), *_of_followers(a, b, laid)]
     if not unmapped:
