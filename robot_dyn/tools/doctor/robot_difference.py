@@ -118,6 +118,8 @@ class RobotDifference(Answer):
             if row is not None and row.difference
         ]
         what = f"largest differences found {'; '.join(found)}" if found else f"no difference found in {_BOTH}"
+        if not found and self.differences:
+            what += f", but these values differ: {', '.join(dict.fromkeys(x.quantity for x in self.differences))}"
         moved = ", ".join(x.a for x in self.joints if (x.sign, x.offset) != (1, 0.0))
         converted = f"; q is converted at {moved}: another sign or zero position" * bool(moved)
         return f"{a} and {b} {'agree' if self.agrees else 'differ'}: {what}{converted}"
