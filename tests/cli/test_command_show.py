@@ -16,7 +16,7 @@ from robot_dyn.view import PLOTS
 from tests.browser import opened
 from tests.command import run, said
 
-PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": "heyoka"}
+PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo"}
 
 
 @pytest.fixture(scope="module")
