@@ -29,7 +29,6 @@ import psutil
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.cluster import client_of
 from robot_dyn.tools.sweeps.folder import Folder, opened
 from robot_dyn.tools.sweeps.run_sweep import begun
 from robot_dyn.tools.sweeps.work import Work
@@ -188,7 +187,13 @@ def cluster(given: argparse.Namespace) -> None:
     once, the setup and its kernels, is told apart.
     """
     many = panda if given.arm == "panda" else planar
-    with tempfile.TemporaryDirectory() as folder, client_of("local:2x1") as client:
+    import distributed
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local,
+        distributed.Client(local, set_as_default=False) as client,
+    ):
         chunk = begun(many(folder, 10**7), Path(folder) / "pilot").chunk
         workers = [psutil.Process(pid) for pid in client.run(os.getpid).values()]
 

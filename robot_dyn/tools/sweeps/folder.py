@@ -300,8 +300,11 @@ def _design(path: Path, digest: str) -> Path:
     return path / f"design-{digest[:16]}.npy"
 
 
-def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
-    """Return the folder of a sweep, and the sweep; for arguments and errors, see `run_sweep.read`."""
+def opened(path: Path, names: Named = NOTHING, *, runs: bool = False) -> tuple[Folder, Sweep]:
+    """Return the folder of a sweep, and the sweep; for arguments and errors, see `read_sweep`.
+
+    To make runs, the versions of packages must be those of the folder, too.
+    """
     check_places(path)
     stored = stated_in(path)
     try:
@@ -309,7 +312,7 @@ def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
     except SceneError as error:
         remedy = "pass the present path of the scene, sw.read_sweep(folder, scene=…) or --scene"
         raise SweepError(f"{path / FILE}: {error}; {remedy}") from None
-    stored.check_same(specification(sweep, stored.chunk), path, versions=False)
+    stored.check_same(specification(sweep, stored.chunk), path, versions=runs)
     return folder_of(path, sweep, stored), sweep
 
 

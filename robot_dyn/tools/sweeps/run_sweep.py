@@ -61,7 +61,7 @@ def run(
         sweep: The sweep.
         folder: A new folder, or the folder of the same sweep.
         threads: Number of threads of this process; None for one for each processor.
-        cluster: Workers of Dask.distributed instead of threads: "local:2", the address of a scheduler, or a `Client`.
+        cluster: A `distributed.Client`, whose workers make the runs instead of threads.
         job: Part of the chunks, for example "3/16" in the third of 16 jobs.
         chunk: Number of runs in a file; None for about 2 s of work, by a pilot of 64 runs. Constant for a folder.
         on_progress: Function of the number of finished runs, and of all runs; None for a progress bar if stderr is a
@@ -77,8 +77,12 @@ def run(
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
     path, (number, jobs), work = file_path(folder, SweepError), share_of(job), Work(sweep)
     count = thread_count(threads)
-    if cluster is not None and (job is not None or threads is not None):
-        raise SweepError("cluster: its scheduler distributes the chunks; remove job and threads")
+    if cluster is not None:
+        client = needs("distributed", extra="cluster").Client
+        remedy = "give a distributed.Client, such as Client('tls://host:8786')"
+        instance("cluster", cluster, client, remedy, error=SweepError)
+        if job is not None or threads is not None:
+            raise SweepError("cluster: its scheduler distributes the chunks; remove job and threads")
     check_places(path)
     check_folder(path, SweepError)
     _ = sweep.setup, work.record  # raises if a folder names functions that its reader has not named
@@ -104,10 +108,9 @@ def run(
         if cluster is None:
             fill_by_threads(make, missing, count, report_progress)
         else:
-            from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
+            from robot_dyn.tools.sweeps.cluster import fill_by_cluster
 
-            with client_of(cluster) as client:
-                fill_by_cluster(client, store, names_of(sweep), missing, report_progress)
+            fill_by_cluster(cluster, store, names_of(sweep), missing, report_progress)
         if sweep.uncut and not len(store.missing()) and not (path / UNCUT).exists():
             with suppress(Stopped):
                 store.write_comparison(work.compared())
