@@ -121,10 +121,10 @@ def samples(given: argparse.Namespace) -> None:
         done = sw.run(
             replace(planar(folder, given.runs), samples=sw.samples("q", "v", "u")), f"{folder}/out", threads=2
         )
-        size = sum(path.stat().st_size for path in Path(folder, "out", "samples").rglob("*") if path.is_file())
+        size = sum(path.stat().st_size for path in Path(folder, "out", "rows").rglob("*") if path.is_file())
         ran, data = peak_rss(), done.samples()
-        last = data.q[:, -1, 1].values  # of all runs, which reads every shard
-        print(f"{given.runs} runs, {size / 2**30:.2f} GiB of samples in chunks of {done.folder.chunk}: peak RSS"
+        last = data.q[:, -1, 1].values  # of all runs
+        print(f"{given.runs} runs, {size / 2**30:.2f} GiB of rows and samples, chunks of {done.folder.chunk}: peak RSS"
               f" {ran:.0f} MiB; quantiles of q read back {np.quantile(last, (0.05, 0.5, 0.95))}, equal to the rows:"
               f" {(last == done.table('end')['end']).all()}; peak RSS {peak_rss():.0f} MiB", flush=True)  # fmt: skip
 
@@ -147,7 +147,7 @@ def overhead(given: argparse.Namespace) -> None:
             start, stop = known.run_range(chunk)
 
             def sweep(chunk: int = chunk, start: int = start, stop: int = stop) -> None:
-                known.write(chunk, work.rows(start, stop))
+                known.write(chunk, *work.run_rows(start, stop))
 
             values = plan.values(start, stop)
 
@@ -243,7 +243,7 @@ def resume(given: argparse.Namespace) -> None:
         sweep = planar(folder, 640_000)
         known = begun(sweep, Path(folder) / "out", chunk=64)
         known.prepare()
-        known.write(0, Work(sweep).rows(0, 64))
+        known.write(0, *Work(sweep).run_rows(0, 64))
         for chunk in range(1, known.count - 1):
             os.link(known.file(0), known.file(chunk))
         # in a process of its own, whose kernels are in the store

@@ -13,8 +13,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import SweepError, needs
 from robot_dyn.tools.sweeps.chunks import fill
@@ -87,9 +85,9 @@ def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
 
 def make_chunk(ticket: Ticket, chunk: int) -> None:
     """Run a chunk and write it, unless its file exists."""
-    folder, work, t = _work(ticket)
+    folder, work = _work(ticket)
     if not folder.file(chunk).exists():
-        folder.write(chunk, *work.run_rows(*folder.run_range(chunk), t))
+        folder.write(chunk, *work.run_rows(*folder.run_range(chunk)))
 
 
 def _answer(ticket: Ticket) -> str:
@@ -101,8 +99,8 @@ def _answer(ticket: Ticket) -> str:
 
 
 @lru_cache(maxsize=1)
-def _work(ticket: Ticket) -> tuple[Folder, Work, np.ndarray | None]:
-    """Return folder, work and times of samples of a sweep, created once per worker.
+def _work(ticket: Ticket) -> tuple[Folder, Work]:
+    """Return folder and work of a sweep, created once per worker.
 
     Raises:
         SweepError: If the folder has another sweep than the driver's, or was begun with other versions of packages.
@@ -112,4 +110,4 @@ def _work(ticket: Ticket) -> tuple[Folder, Work, np.ndarray | None]:
         raise SweepError(
             f"{folder.path} has another sweep than the driver's folder; give a folder that all hosts share"
         )
-    return folder, Work(sweep), None if folder.samples is None else folder.samples.times()
+    return folder, Work(sweep)

@@ -4,7 +4,6 @@ sweep.json                   the specification
 design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
 rows/000123.parquet          a chunk; with more than 20 000 chunks rows/0004/080123.parquet
 uncut.json                   of an uncut sweep: some of its runs compared with runs whose steps end at thresholds
-samples/                     samples of runs, if they are kept
 
 Files are written completely or not at all. Two writers of one file do no harm: both write the same rows.
 """
@@ -14,13 +13,12 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from time import time
-from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
@@ -29,11 +27,11 @@ from pydantic import TypeAdapter
 from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, sync_folder, why
 from robot_dyn.simulation.rollouts.comparison import Comparison
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
-from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
-from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
+from robot_dyn.tools.sweeps.kept_samples import dataset, longest
+from robot_dyn.tools.sweeps.rows import OUTCOMES, SAMPLE_COLUMNS, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
 from robot_dyn.tools.sweeps.sweep import Sweep
-from robot_dyn.tools.sweeps.work import IN_LOCK_STEP, OneByOne
+from robot_dyn.tools.sweeps.work import IN_LOCK_STEP, Facts, OneByOne
 
 MOST_FILES = 20_000  # largest number of files in a folder
 OLD_S = 86_400.0  # age in [s] after which an unfinished file is removed
@@ -54,9 +52,8 @@ class Folder:
         runs: Number of runs, N.
         chunk: Number of runs in a chunk; the last chunk may have fewer.
         digest: SHA-256 of the specification.
-        names: Names of varying parameters and of figures.
+        names: Names of varying parameters, of figures and of columns of samples.
         metadata: Versions and processor, stored in footers.
-        samples: Store of samples of runs; None if samples are not kept.
     """
 
     path: Path
@@ -65,7 +62,6 @@ class Folder:
     digest: str
     names: tuple[str, ...]
     metadata: dict[str, Any] = field(default_factory=dict)
-    samples: SampleStore | None = None
 
     @property
     def count(self) -> int:
@@ -119,11 +115,8 @@ class Folder:
                 if time() - path.lstat().st_mtime > OLD_S:
                     path.unlink()
 
-    def write(
-        self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({}),
-        alone: OneByOne = IN_LOCK_STEP,
-    ) -> None:  # fmt: skip
-        """Write a chunk, its samples first; raise a SweepError, with existing files unchanged, if that fails."""
+    def write(self, chunk: int, rows: Rows, facts: Facts) -> None:
+        """Write a chunk; raise a SweepError, with existing files unchanged, if that fails."""
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
         start, stop = self.run_range(chunk)
         footer = {
@@ -132,10 +125,8 @@ class Folder:
             "start": start,
             "stop": stop,
             "rows": digest_of([rows]),
-            "one_by_one": asdict(alone),
-        }
+        } | asdict(facts)
         try:
-            footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
             stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.metadata)})
             table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
             save(
@@ -192,11 +183,16 @@ class Folder:
         """Return the footer of a chunk; for errors, see `read`."""
         return self._read(chunk, [])[1]
 
-    def check_samples(self) -> None:
-        """Raise a SweepError if samples that were written are missing or have changed."""
-        if self.samples is not None:
-            for chunk in range(self.count):
-                self.samples.check(chunk, self.footer(chunk)["samples"])
+    def samples(self, columns: Mapping[str, str], joint_types: Sequence[str | None]) -> Any:
+        """Return the samples in columns, by quantity, as a `xarray.Dataset` of kept runs; for errors, see `read`."""
+        parts: list[Rows] = []
+        t, joints = np.empty(0), ()
+        for chunk in range(self.count):
+            rows, footer = self._read(chunk, list(columns.values()))
+            parts.append(rows)
+            t, joints = longest(t, np.array(footer["t"])), footer["joints"]
+        lists = {name: np.concatenate([part[column] for part in parts]) for name, column in columns.items()}
+        return dataset(lists, t, joints, joint_types)
 
     def columns(self, names: Iterable[str]) -> Rows:
         """Return columns of all rows, (N,); for errors, see `read`."""
@@ -226,16 +222,16 @@ class Folder:
             raise _DamagedError("belongs to another sweep")
         if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, start, stop):
             raise _DamagedError("contains other runs than its name states")
-        if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
-            raise _DamagedError("its footer lacks digests of rows and samples")
-        TypeAdapter(OneByOne).validate_python(footer["one_by_one"])
+        if not isinstance(footer["rows"], str):
+            raise _DamagedError("its footer lacks the digest of its rows")
+        TypeAdapter(Facts).validate_python({name: footer[name] for name in ("one_by_one", "t", "joints")})
         if not file.schema_arrow.equals(schema(self.names)):
             raise _DamagedError("its columns are not those of the sweep")
         if not names:
             return {}, footer
         table = file.read(columns=["run", *names], use_threads=False)
         columns = {name: table[name].to_numpy() for name in table.column_names}
-        if any(table[name].null_count for name in columns):
+        if any(table[name].null_count for name in columns.keys() - SAMPLE_COLUMNS.values()):
             raise _DamagedError("has cells without a value")
         if columns.pop("run").tolist() != list(range(start, stop)):
             raise _DamagedError(f"its rows are not those of runs {start} to {stop - 1}")
@@ -246,6 +242,14 @@ class Folder:
 
 class _DamagedError(Exception):
     """A fault of the file of a chunk."""
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder and its parents; raise a SweepError if that fails."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SweepError(f"{path}: the folder cannot be created ({why(error)}); give another path") from None
 
 
 def read_design(path: Path, digest: str) -> np.ndarray:
@@ -318,6 +322,5 @@ def opened(path: Path, names: Named = NOTHING, *, runs: bool = False) -> tuple[F
 
 def folder_of(path: Path, sweep: Sweep, stated: Specification) -> Folder:
     """Return the folder of a sweep with the specification in it."""
-    store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
-    names, metadata = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
-    return Folder(path, stated.runs, stated.chunk, stated.digest, names, metadata, store)
+    names = (*sweep.columns, *sweep.figures, *(sweep.samples.columns.values() if sweep.samples else ()))
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, {"versions": versions()} | processor())

@@ -34,7 +34,7 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     folder = begun(sweep, tmp_path / "out", chunk=20)
     folder.prepare()
     work = Work(sweep)
-    folder.write(0, work.rows(0, 20))
+    folder.write(0, *work.run_rows(0, 20))
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -44,22 +44,10 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     )
     with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
         patch.setattr(os, "fsync", full)
-        folder.write(3, work.rows(60, 80))
+        folder.write(3, *work.run_rows(60, 80))
     assert folder.missing().tolist() == [1, 2, 3, 4]
     done = sw.run(sweep, tmp_path / "out")
     assert done.verify() == digest(sweep)
-
-
-def test_samples_whose_folder_cannot_be_made_are_refused_with_the_chunk(tmp_path: Path) -> None:
-    pytest.importorskip("zarr")
-    sweep = swept(tmp_path, 40, samples="q")
-    folder = begun(sweep, tmp_path / "out", chunk=20)
-    assert folder.samples is not None
-    folder.prepare()
-    (folder.samples.path / "q" / "c").write_text("")
-    with pytest.raises(SweepError, match=r"^chunk 1 \(runs 20 to 39\): "):
-        folder.write(1, *Work(sweep).run_rows(20, 40, folder.samples.times()))
-    assert folder.missing().tolist() == [0, 1]
 
 
 def test_the_name_of_a_specification_is_on_the_disk_before_the_sweep_begins(tmp_path: Path, monkeypatch) -> None:
