@@ -2,7 +2,7 @@
 
 sweep.json                   the specification
 design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
-rows/000123.parquet          a chunk; with more than 20 000 chunks rows/0004/080123.parquet
+rows/000123.parquet          a chunk
 uncut.json                   of an uncut sweep: some of its runs compared with runs whose steps end at thresholds
 
 Files are written completely or not at all. Two writers of one file do no harm: both write the same rows.
@@ -33,11 +33,10 @@ from robot_dyn.tools.sweeps.specification import FILE, Specification, processor,
 from robot_dyn.tools.sweeps.sweep import Sweep
 from robot_dyn.tools.sweeps.work import IN_LOCK_STEP, Facts, OneByOne
 
-MOST_FILES = 20_000  # largest number of files in a folder
 OLD_S = 86_400.0  # age in [s] after which an unfinished file is removed
 UNCUT = "uncut.json"
 _MOST_TABLE, _MOST_COMPARISON = 2**34, 2**20
-_SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
+_FOOTER, _UNFINISHED = b"footer", ".unfinished"
 _REMEDY = "run the sweep again, after removing this file"
 _AGAIN = "run the sweep into this folder again, which writes the file"
 
@@ -74,43 +73,32 @@ class Folder:
 
     def file(self, chunk: int) -> Path:
         """Return the file of a chunk."""
-        return self._subfolder(chunk) / f"{chunk:06d}{_SUFFIX}"
-
-    def _subfolder(self, chunk: int) -> Path:
-        rows = self.path / "rows"
-        return rows if self.count <= MOST_FILES else rows / f"{chunk // MOST_FILES:04d}"
+        return self._rows / _file_name(chunk)
 
     @property
-    def _subfolders(self) -> list[Path]:
-        return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
+    def _rows(self) -> Path:
+        return self.path / "rows"
 
     def present(self) -> np.ndarray:
         """Return True for chunks with a file, (count,)."""
-        present = np.zeros(self.count, bool)
-        for folder in self._subfolders:
-            try:
-                names = os.listdir(folder)
-            except FileNotFoundError:
-                continue
-            except OSError as error:
-                raise SweepError(
-                    f"{folder}: is not a folder of rows ({why(error)}); remove it, and run again"
-                ) from None
-            for name in names:
-                stem = name.removesuffix(_SUFFIX)
-                if stem.isdigit() and stem != name and int(stem) < self.count:
-                    present[int(stem)] = True
-        return present
+        try:
+            names = set(os.listdir(self._rows))
+        except FileNotFoundError:
+            names = set()
+        except OSError as error:
+            raise SweepError(
+                f"{self._rows}: is not a folder of rows ({why(error)}); remove it, and run again"
+            ) from None
+        return np.array([_file_name(chunk) in names for chunk in range(self.count)])
 
     def missing(self) -> np.ndarray:
         """Return the indices of chunks without a file."""
         return np.flatnonzero(~self.present())
 
     def prepare(self) -> None:
-        """Create the folders, and remove files that killed writers left more than a day ago."""
-        for folder in self._subfolders:
-            make_folder(folder)
-        for path in (path for folder in (self.path, *self._subfolders) for path in folder.glob(f".*{_UNFINISHED}")):
+        """Create the folder of rows, and remove files that killed writers left more than a day ago."""
+        make_folder(self._rows)
+        for path in (*self.path.glob(f".*{_UNFINISHED}"), *self._rows.glob(f".*{_UNFINISHED}")):
             with suppress(OSError):  # removed meanwhile, or owned by another user
                 if time() - path.lstat().st_mtime > OLD_S:
                     path.unlink()
@@ -238,6 +226,10 @@ class Folder:
         if strange := set(columns.get("outcome", ())) - set(OUTCOMES):
             raise _DamagedError(f"has the outcome {shown(min(strange))}, not one of {', '.join(OUTCOMES)}")
         return {name: x.astype(type_of(name)) for name, x in columns.items()}, footer
+
+
+def _file_name(chunk: int) -> str:
+    return f"{chunk:06d}.parquet"
 
 
 class _DamagedError(Exception):
