@@ -1,7 +1,7 @@
 """Motors whose torque falls with speed: −τ(max(−v, 0)) ≤ u ≤ τ(max(v, 0)), with a polyline τ of the speed.
 
-A motor that drives (u v > 0) gives |u| ≤ τ(|v|), and nothing beyond its no-load speed; one that brakes gives its peak
-τ(0). With the corners ω_k of the polyline and the changes s_k of its slope there,
+A driving motor (u v > 0) can exert |u| ≤ τ(|v|), which is 0 beyond its no-load speed; a braking motor can exert its
+peak τ(0). With the corners ω_k of the polyline and the changes s_k of its slope there,
 
     τ(ω) = τ(0) + Σ s_k max(ω − ω_k, 0)
 
@@ -28,12 +28,12 @@ from robot_dyn.foundations.coefficients import (
     with_values,
 )
 from robot_dyn.foundations.errors import EffectError, RobotDynError, shown
-from robot_dyn.foundations.saturation import limits_reached, piece, saturated
+from robot_dyn.foundations.saturation import limit_thresholds, piece, saturated
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
 AT = "joint", "motor"
-_ABSURD = 100.0  # [rad/s] or [m/s]: a joint that seems to be faster has its values at the motor
+_MAX_JOINT_SPEED = 100.0  # [rad/s] or [m/s]: higher speeds at the joint must be those of a motor
 _NO_LIMIT = np.zeros(1), np.full(1, inf)
 
 
@@ -44,14 +44,14 @@ class TorqueSpeedLimit(Bound):
 
     Attributes:
         speed: Speeds at the corners of the polyline τ, increasing, in [rad/s] or [m/s]: (k,) for all joints, (n, k), or
-            by joint name; joints left out have no limit. τ is constant below the first speed.
-        torque: Peak torques there, in [N m] or [N], which do not increase; the last one is 0, at the no-load speed. A
-            row of inf for a joint without a limit.
-        at: "joint" or "motor", the place of speeds and torques.
-        gear_ratio: N, a scalar or (n,), needed at the motor: the joint has N times its torque, at 1/N of its speed.
+            by joint name; omitted joints have no limit. τ is constant below the first speed.
+        torque: Peak torques there, in [N m] or [N], not increasing; the last one is 0, at the no-load speed. A row of
+            inf for a joint without a limit.
+        at: "joint" or "motor": where speeds and torques are measured.
+        gear_ratio: N, a scalar or (n,), required at the motor: the joint has N times its torque at 1/N of its speed.
 
     Raises:
-        EffectError: If the polyline is invalid, or speeds above 100 rad/s are at the joint: they are those of a motor.
+        EffectError: If the polyline is invalid, or speeds at the joint exceed 100 rad/s, as only those of a motor do.
 
     Example:
         >>> rd.effects.TorqueSpeedLimit(speed=[0.0, 200.0, 350.0], torque=[0.4, 0.4, 0.0], at="motor", gear_ratio=100.0)
@@ -97,9 +97,9 @@ class TorqueSpeedLimit(Bound):
         check_place(self.at, self.gear_ratio is not None, EffectError)
         speed, torque = self._stated
         if isinstance(speed, Mapping) != isinstance(torque, Mapping):
-            raise EffectError("speed and torque must both be by joint name, or both be numbers; give both alike")
+            raise EffectError("speed and torque must both be by joint name or both be arrays")
         if isinstance(speed, Mapping) and speed.keys() != torque.keys():
-            raise EffectError(f"speed and torque name different joints, {shown([*speed])} and {shown([*torque])}")
+            raise EffectError(f"speed and torque have different joints, {shown([*speed])} and {shown([*torque])}")
         for name, (x, y) in self._lines():
             if np.isinf(y).all():
                 continue
@@ -171,7 +171,7 @@ class TorqueSpeedLimit(Bound):
             for sign in ((1, -1)[way],)
         }
         passed = (Threshold(i, x, "torque–speed corner", "passed", "left", of_velocity=True) for i, x in levels)
-        return (*passed, *limits_reached(limit, middle, n))
+        return (*passed, *limit_thresholds(limit, middle, n))
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
         _, corners, slopes, floors, limit, _ = self._tables
@@ -191,13 +191,13 @@ class TorqueSpeedLimit(Bound):
         return middle + saturated(u - middle, half * limit, half * place)
 
     def limited(self, u: Array, v: Array) -> Array:
-        """Return the place of u between both limits at v, −1 at the lower and 1 at the upper one; 0 in the middle."""
+        """Return the position of u between the limits at v: −1 at the lower, 0 in the middle, 1 at the upper limit."""
         middle, half = self._range(v)
         return (u - middle) / half
 
     @property
-    def limits_joint(self) -> np.ndarray:
-        """True for joints with a limit, (n,); of an effect in a plant."""
+    def is_limited(self) -> np.ndarray:
+        """True for joints with a limit, (n,); defined for an effect in a plant."""
         return np.isfinite(self._tables[4])
 
     def _range(self, v: Array) -> tuple[Array, Array]:
@@ -212,7 +212,7 @@ class TorqueSpeedLimit(Bound):
 
 
 def check_place(at: object, has_ratio: bool, error: type[RobotDynError]) -> None:
-    """Raise an error unless values are at the joint, or at the motor with a gear ratio."""
+    """Raise an error unless values are at the joint without a gear ratio, or at the motor with one."""
     if not isinstance(at, str) or at not in AT:
         raise error(f"at must be joint or motor, got {shown(at)}")
     if (at == "motor") != has_ratio:
@@ -223,7 +223,7 @@ def check_place(at: object, has_ratio: bool, error: type[RobotDynError]) -> None
 def check_line(name: str, speed: np.ndarray, torque: np.ndarray, error: type[RobotDynError]) -> None:
     """Raise an error unless the speeds of a polyline increase, and its torques do not."""
     if np.shape(speed) != np.shape(torque):
-        raise error(f"{name}: there are {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
+        raise error(f"{name}: got {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
     if not torque[0] > 0:
         raise error(f"{name}: torque must begin with a positive value, got {torque[0]:g}")
     step = np.diff(speed)
@@ -235,10 +235,10 @@ def check_line(name: str, speed: np.ndarray, torque: np.ndarray, error: type[Rob
 
 def check_speed(name: str, speed: float, error: type[RobotDynError]) -> None:
     """Raise an error for a speed of a motor that is stated at the joint."""
-    if speed > _ABSURD:
+    if speed > _MAX_JOINT_SPEED:
         raise error(
-            f"{name}: {speed:.4g} rad/s ({speed * 30 / np.pi:.4g} rpm) at the joint is the speed of a motor before its"
-            " gear: set at to motor and give the gear ratio, 1 for a joint without a gear"
+            f"{name}: {speed:.4g} rad/s ({speed * 30 / np.pi:.4g} rpm) at the joint must be the speed of a motor before"
+            " its gear; set at to motor and give the gear ratio, 1 without a gear"
         )
 
 

@@ -19,7 +19,7 @@ from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
 
 _BETA_ORDER = 0.2  # β times the order of the error: the weight of the previous error in the next step
-_SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # safety factor, and limits of the factor of a new step
+_SAFETY, _MIN, _MAX = 0.9, 0.2, 10.0  # safety factor, and limits of the factor of a new step
 _NOT_FINITE = 0.1  # factor of a step whose error is not finite
 _STRETCH = 1.01  # a step is stretched to the end, to avoid a tiny last step
 _SPACINGS = 4  # shortest step, in spacings of floats at t
@@ -165,7 +165,7 @@ def controls_error(control: StepControl) -> bool:
 def shortened(control: StepControl, h: float, e: float) -> float:
     """Return the length of the next trial after a step of length h is rejected with the error e."""
     control.rejected[0] += 1
-    return abs(h) * (max(_LEAST, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
+    return abs(h) * (max(_MIN, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
 
 
 def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected: bool) -> None:
@@ -175,9 +175,9 @@ def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected:
     """
     alpha = control.exponent
     beta = _BETA_ORDER * alpha
-    factor = _MOST
+    factor = _MAX
     if e > 0.0:
-        factor = min(_MOST, max(_LEAST, _SAFETY * e ** (0.75 * beta - alpha) * control.error[0] ** beta))
+        factor = min(_MAX, max(_MIN, _SAFETY * e ** (0.75 * beta - alpha) * control.error[0] ** beta))
     next_h = h * (min(1.0, factor) if rejected else factor)
     control.next_h[0] = max(next_h, control.next_h[0]) if reaches_end and not rejected else next_h
     control.error[0] = max(e, 1e-4)

@@ -119,7 +119,7 @@ def _on_lines(setup: Setup, t: np.ndarray, v: np.ndarray, u: np.ndarray, units: 
     for effect in setup.plant.effects:
         if not isinstance(effect, TorqueSpeedLimit):
             continue
-        at_line = (np.abs(effect.limited(u, v)) >= 1 - _ROUNDING) & effect.limits_joint
+        at_line = (np.abs(effect.limited(u, v)) >= 1 - _ROUNDING) & effect.is_limited
         for i in np.flatnonzero(at_line.any(axis=0)):
             rows = np.flatnonzero(at_line[:, i])
             k = rows[np.abs(v[rows, i]).argmax()]

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
+from robot_dyn.integrate.adaptive import MIN_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.imbalance import finer
 from robot_dyn.simulation.diagnostics.missed_events import Missed, cut_alike, stepped_over
@@ -138,7 +138,7 @@ def _by_refinement(
     if run.events:
         halves = np.setdiff1d(halves, [event.t for event in run.events], assume_unique=True)
     tight = None
-    if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
+    if estimated.kink < np.inf and method.rtol / 10 > MIN_RTOL:
         tight = runner.run(_tolerant(setup, method, 0.1)).shared
     halved = runner.run(setup, halves).shared
     gap = differences(estimated.path, halved, estimated.n)

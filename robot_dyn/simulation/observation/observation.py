@@ -89,7 +89,7 @@ def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Obser
     ]
 
 
-NOTHING = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # before any step
+NEGLIGIBLE = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # before any step
 
 
 def observe(observation: Observation, began: float, t: float, q: Array, v: Array, u: Array, acted: bool) -> None:

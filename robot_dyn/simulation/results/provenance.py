@@ -22,8 +22,8 @@ from robot_dyn.description.edits import Payload
 from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.foundations.extras import version_of
 from robot_dyn.foundations.portable_bits import has_portable_bits
-from robot_dyn.model.findings import reservations
-from robot_dyn.model.right_angles import written_out
+from robot_dyn.model.findings import reading_findings
+from robot_dyn.model.right_angles import right_angle_note
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.results.run_data import RunData
@@ -48,7 +48,9 @@ def origin(dynamics: Dynamics) -> dict[str, str]:
 
 def edits_of_machine_code(setup: Setup) -> dict[str, str]:
     """Return the changes of machine code to a setup as texts of a run: right angles of plant and models."""
-    edited_angles = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
+    edited_angles = right_angle_note(
+        setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ())
+    )
     return {"right_angles": edited_angles} if edited_angles else {}
 
 
@@ -102,7 +104,7 @@ def portable(source: str, folder: Path) -> str:
 def about_the_robot(run: RunData) -> Iterator[str]:
     """Yield the first estimates, assumptions and omissions of the robot's file as lines, and the number of the rest."""
     with suppress(DescriptionError):
-        findings = reservations(_description(run))
+        findings = reading_findings(_description(run))
         yield from (f"robot: {shorten(finding, 200)}" for finding in findings[:_LISTED])
         if more := findings[_LISTED:]:
             yield f"robot: {len(more)} more findings on its file; rd.info lists them"

@@ -19,7 +19,7 @@ from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.compiled.cache import machine_code
 from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.dynamics.loop_state import LaneEnd, lanes_of, loop_config, start_position
-from robot_dyn.simulation.observation.observation import NOTHING
+from robot_dyn.simulation.observation.observation import NEGLIGIBLE
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, starts
 from robot_dyn.simulation.run.recording import Loop, records_of
@@ -77,7 +77,7 @@ class Periods:
             empty = np.empty((0, 0, LANES))
             records = records_of(
                 rows=np.zeros(0, np.int64), y=empty, sampled=empty, shared=np.empty((0, equation.size)),
-                step_log=np.empty((0, equation.size)), columns=np.empty((1 + 3 * n, 0)), observation=NOTHING,
+                step_log=np.empty((0, equation.size)), columns=np.empty((1 + 3 * n, 0)), observation=NEGLIGIBLE,
             )  # fmt: skip
             config = loop_config(equation, alone=False)._replace(largest=LARGEST)
             position, calls = start_position(inf), []

@@ -11,7 +11,7 @@ from typing import Any, final, overload
 
 import numpy as np
 
-from robot_dyn.foundations.display import MOST_JOINTS, curves, page, plot, text
+from robot_dyn.foundations.display import MAX_JOINTS, curves, page, plot, text
 from robot_dyn.foundations.errors import QueryError, escaped
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column, Variable
@@ -166,7 +166,7 @@ class Rollouts(RolloutsData):
         return save_data(self, path, lambda runs, file: write_rollouts(runs, file, runs.overview))
 
     def _repr_html_(self) -> str:
-        joints = self.joint_names[:MOST_JOINTS]
+        joints = self.joint_names[:MAX_JOINTS]
         if self.q is None or not len(self):
             return page("Rollouts", text(self.summary))
         some = self.q[np.linspace(0, len(self) - 1, min(len(self), _MOST_DRAWN)).astype(int)]

@@ -259,7 +259,7 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     if not matches:
         raise QueryError(f"vary: {_unknown(setup, name)}")
     size, shape, limits = matches[0].size, matches[0].value.shape, matches[0].declared
-    shapes = (("B",), ("B", 1), ("B", size)) if limits.of_joints or size == 1 else (("B", *shape),)
+    shapes = (("B",), ("B", 1), ("B", size)) if limits.is_per_joint or size == 1 else (("B", *shape),)
     array = numbers(
         f"vary: {name}", values, *shapes,
         least=limits.minimum, above=limits.exclusive_minimum, infinite=limits.infinite,

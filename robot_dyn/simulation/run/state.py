@@ -13,7 +13,7 @@ from robot_dyn.simulation.dynamics.loop_state import LoopConfig, lanes_of, loop_
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.events.payload_events import PayloadEvents
-from robot_dyn.simulation.observation.observation import NOTHING
+from robot_dyn.simulation.observation.observation import NEGLIGIBLE
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.recording import Loop, Records, records_of
 from robot_dyn.simulation.run.watch import Watch
@@ -67,7 +67,7 @@ class RunState:
             shared=np.empty((shared, m)),
             step_log=np.empty((steps, m)),
             columns=np.empty((1 + 3 * n, 0)) if observer is None else observer.columns,
-            observation=NOTHING if observer is None else observer.observation,
+            observation=NEGLIGIBLE if observer is None else observer.observation,
         )
         self.config = config
         self.loop = Loop(self.table, self.lanes, records, config, self.position)

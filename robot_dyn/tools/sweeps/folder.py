@@ -26,7 +26,7 @@ from pydantic import TypeAdapter
 
 from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, sync_folder, why
 from robot_dyn.simulation.rollouts.comparison import Comparison
-from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
+from robot_dyn.tools.sweeps.imported import NONE_NAMED, Named, check_places
 from robot_dyn.tools.sweeps.kept_samples import dataset, longest
 from robot_dyn.tools.sweeps.rows import OUTCOMES, SAMPLE_COLUMNS, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
@@ -296,7 +296,7 @@ def _design(path: Path, digest: str) -> Path:
     return path / f"design-{digest[:16]}.npy"
 
 
-def opened(path: Path, names: Named = NOTHING, *, runs: bool = False) -> tuple[Folder, Sweep]:
+def opened(path: Path, names: Named = NONE_NAMED, *, runs: bool = False) -> tuple[Folder, Sweep]:
     """Return the folder of a sweep, and the sweep; for arguments and errors, see `read_sweep`.
 
     To make runs, the versions of packages must be those of the folder, too.
