@@ -1,4 +1,4 @@
-"""Loading: maps a name or path to a Robot in standard gravity."""
+"""Loading of robots by name or path, in standard gravity."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def load(
             links, which opens mesh files, with masses from the next three arguments. `Robot.estimated` lists these
             links; values stated by the file are not changed.
         mass: With "from_shapes": masses by link, in [kg].
-        total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; the mass not stated elsewhere is
-            shared by the volume of convex hulls.
+        total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; links without a mass share the
+            rest in proportion to the volume of their convex hulls.
         density: With "from_shapes": density in [kg/m³] of links without a mass, instead of `total_mass`.
-        allow_overlap: With "from_shapes": accept meshes whose closed parts overlap, and count the shared volume once
-            for each part; by default they are refused, because their mass is ambiguous.
+        allow_overlap: With "from_shapes": accept meshes whose closed parts overlap, and count the common volume once
+            per part; by default they are refused, because their mass is ambiguous.
         download: Allow robot_descriptions to download missing files.
         without: Elements to leave out of an MJCF file, from "tendon", "equality", "free" and "ball"; findings list
             them. MJCF, in a file with suffix .xml or .mjcf, is compiled by MuJoCo, which opens its meshes; needs
@@ -47,12 +47,12 @@ def load(
 
     Raises:
         CatalogError: If there is no such robot or file, an entry of `package_dirs` is not a folder, or a description
-            is not on disk.
+            has not been downloaded.
         MissingExtraError: If robot_descriptions is needed but not installed: pip install 'robot-dyn[robots]'.
-        DescriptionError: If the file is refused, or cannot be expanded, or the shape of a link without inertia cannot
-            be read.
-        QueryError: If an estimate needs a mass and there is none, or a given mass is not positive, already stated, or
-            of an unknown link.
+        DescriptionError: If the file is refused or cannot be expanded, or a shape needed for an estimate cannot be
+            read.
+        QueryError: If an estimate lacks a mass, or a given mass is not positive, already stated by the file, or of an
+            unknown link.
 
     Warns:
         ModelWarning: Once, if there are findings about the description; the robot is loaded anyway.

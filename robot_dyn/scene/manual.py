@@ -28,7 +28,7 @@ against.
 - Units are SI and end the names of keys. They are for a revolute joint: for a prismatic joint read m for rad and
   N for N m, so N m/rad is N/m, and kg for kg m² of an armature; a bandwidth is in rad/s for both.
 - *by joint* is one number for all joints, a list of n numbers in the order of `robot-dyn info`, or a table by name
-  such as `{elbow_joint = 0.3}`, in which joints left out have 0 unless stated otherwise.
+  such as `{elbow_joint = 0.3}`, in which omitted joints have 0 unless stated otherwise.
 - `"urdf"` is the value in the file of the robot.
 - Numbers must be finite. A key that is not listed here is an error.
 """

@@ -68,7 +68,7 @@ class Attachment(Part):
     frame: str
     """Link of the arm that carries it."""
     prefix: str = ""
-    """Text before the names of its links and joints."""
+    """Prefix of the names of its links and joints."""
     xyz_m: Vector3 = (0.0, 0.0, 0.0)
     """Position of its root in the frame."""
     rpy_rad: Vector3 = (0.0, 0.0, 0.0)
@@ -164,7 +164,7 @@ class Scene(Part):
             kinds = [effect.kind for effect in effects]
             for kind in ("gravity", "armature"):
                 if (count := kinds.count(kind)) > 1:
-                    raise wrong_key(place, f"{kind} is named {count} times, but only the last would act; keep one")
+                    raise wrong_key(place, f"{kind} appears {count} times, but only the last would act; keep one")
         return self
 
     def setup(self, folder: Path, metadata: dict[str, str]) -> Setup:

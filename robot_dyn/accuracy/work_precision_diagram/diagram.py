@@ -44,7 +44,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         ResultError: If no run finished.
     """
     if not any(np.isfinite(p.error) for ladder in result.ladders for p in ladder.points):
-        raise ResultError("no run finished, so there is nothing to draw; see left_out")
+        raise ResultError("nothing to draw: no run finished; see left_out")
     versions = programs(result.environment, "scipy", "mujoco", "drake", "heyoka")
     caption = "\n".join([*result.basis, versions])
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, caption, theme)

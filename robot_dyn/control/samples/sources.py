@@ -28,7 +28,7 @@ class DataFrame(Protocol):
 
     @property
     def columns(self) -> Iterable[object]:
-        """Names of its columns."""
+        """Names of the columns."""
         ...
 
     def to_numpy(self) -> np.ndarray:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     Source = str | Path | JointValues | DataFrame
 
-_MOST_BYTES = 2**28
+_MAX_BYTES = 2**28
 _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
 _BAG = "give the .mcap file in it, or a CSV file"
 
@@ -103,7 +103,7 @@ def _values(column: Any) -> np.ndarray:
 
 
 def _of_csv(path: str | Path, names: set[str], named_only: bool) -> dict[str, np.ndarray]:
-    """Return the columns of a CSV file by heading; columns without numbers as texts.
+    """Return the columns of a CSV file by heading; columns without numbers as empty texts.
 
     Args:
         path: The file.
@@ -114,7 +114,7 @@ def _of_csv(path: str | Path, names: set[str], named_only: bool) -> dict[str, np
         PlanError: If the file cannot be read, has no samples, or an entry of a named column, or of a column with
             numbers, is not a number; with file and line.
     """
-    lines = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY)
+    lines = csv_rows(path, _MAX_BYTES, PlanError, _REMEDY)
     _, heads = next(lines)
     if wrong := _wrong_headings(heads):
         raise PlanError(f"{path}: {wrong}")

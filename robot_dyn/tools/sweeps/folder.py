@@ -28,7 +28,7 @@ from pydantic import TypeAdapter
 
 from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, sync_folder, why
 from robot_dyn.simulation.rollouts.comparison import Comparison
-from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
+from robot_dyn.tools.sweeps.imported import NEGLIGIBLE, Named, check_places
 from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
@@ -300,7 +300,7 @@ def _design(path: Path, digest: str) -> Path:
     return path / f"design-{digest[:16]}.npy"
 
 
-def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
+def opened(path: Path, names: Named = NEGLIGIBLE) -> tuple[Folder, Sweep]:
     """Return the folder of a sweep, and the sweep; for arguments and errors, see `run_sweep.read`."""
     check_places(path)
     stored = stated_in(path)

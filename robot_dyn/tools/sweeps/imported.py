@@ -36,7 +36,7 @@ class Named:
     figures: tuple[tuple[str, str], ...] = ()
 
 
-NOTHING = Named()
+NEGLIGIBLE = Named()
 
 
 def named(scene: object, figures: object) -> Named:

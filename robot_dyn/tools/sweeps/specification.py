@@ -22,7 +22,7 @@ from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions, figures
 from robot_dyn.tools.sweeps.designs import MOST_ROWS
 from robot_dyn.tools.sweeps.figures import UserFigure
-from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of, is_scene
+from robot_dyn.tools.sweeps.imported import NEGLIGIBLE, Named, check_named, digest_of, is_scene
 from robot_dyn.tools.sweeps.sample_store import Samples
 from robot_dyn.tools.sweeps.sweep import Sweep
 
@@ -101,7 +101,7 @@ class Specification(BaseModel):
                     " give another folder, or the same sweep"
                 )
 
-    def sweep(self, rows: np.ndarray, folder: Path, named: Named = NOTHING) -> Sweep:
+    def sweep(self, rows: np.ndarray, folder: Path, named: Named = NEGLIGIBLE) -> Sweep:
         """Return the sweep, with the present content of its scene.
 
         Functions in the specification are imported only if `named` has them, too.

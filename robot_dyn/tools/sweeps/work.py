@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn import RobotDynError, Rollouts, Setup, Trajectory
-from robot_dyn.foundations import SweepError, because
+from robot_dyn.foundations import SweepError, located_message
 from robot_dyn.simulation import MOST_BYTES, parts_of_run
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
@@ -195,7 +195,7 @@ class Work:
                         rows[name][place] = figure.values(runs.only(i))[0]
                     except Exception as error:
                         rows["outcome"][place] = rows["reason"][place] = RAISED
-                        rows["why"][place] = f"figure {name}: {because(error)}"
+                        rows["why"][place] = f"figure {name}: {located_message(error)}"
 
     def _results(
         self, runs: np.ndarray, values: dict[str, np.ndarray], look: Look | None = None
@@ -216,7 +216,9 @@ class Work:
             return results
 
         for places, results in _in_halves(np.arange(len(batch)), made):
-            yield from [(batch.number_of(places), because(results))] if isinstance(results, Exception) else results
+            yield from (
+                [(batch.number_of(places), located_message(results))] if isinstance(results, Exception) else results
+            )
 
     def _batch(
         self, runs: np.ndarray, values: dict[str, np.ndarray], record: tuple[str, ...]
@@ -230,7 +232,7 @@ class Work:
             return batch_of(setup, q0, v0, chosen, record, runs[at])
 
         attempts = list(_in_halves(np.arange(len(runs)), batch))
-        reasons = {int(at[0]): because(result) for at, result in attempts if isinstance(result, Exception)}
+        reasons = {int(at[0]): located_message(result) for at, result in attempts if isinstance(result, Exception)}
         if not reasons:
             return attempts[0][1], {}
         allowed = [i for i in range(len(runs)) if i not in reasons]

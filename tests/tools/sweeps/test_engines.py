@@ -20,7 +20,7 @@ from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import begun, chunks, cluster
 from robot_dyn.tools.sweeps.chunks import fill_by_threads
 from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
-from robot_dyn.tools.sweeps.imported import NOTHING
+from robot_dyn.tools.sweeps.imported import NEGLIGIBLE
 from robot_dyn.tools.sweeps.work import Stopped
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import digest, names_in, swept
@@ -68,7 +68,7 @@ def filled(tmp_path: Path) -> Iterator[Any]:
 
 
 def fill(client: Any, folder: Any, look: Callable[[], object] = lambda: None) -> None:
-    fill_by_cluster(client, folder, NOTHING, lambda: folder.missing().tolist(), look)
+    fill_by_cluster(client, folder, NEGLIGIBLE, lambda: folder.missing().tolist(), look)
 
 
 def test_completeness_is_asked_of_the_folder(filled: Any) -> None:

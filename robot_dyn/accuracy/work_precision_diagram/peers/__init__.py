@@ -15,7 +15,7 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.simulation.setup.setup import Setup
 
-# By the name of the module that a program needs.
+# By the name of the required module.
 PEERS: dict[str, Callable[[ArmMotion], list[MethodUnderTest]]] = {
     "scipy": scipy.methods_under_test, "mujoco": mujoco.methods_under_test,
     "pydrake": drake.methods_under_test, "heyoka": heyoka.methods_under_test,
@@ -24,14 +24,14 @@ _FREE_MOTION_ONLY = ("pydrake", "heyoka")
 
 
 def methods_of_peers(setup: Setup) -> tuple[list[MethodUnderTest], list[str]]:
-    """Return the methods of other programs for a setup, and notes on programs left out, with reasons."""
+    """Return the methods of other programs for a setup, and notes on omitted programs, with reasons."""
     installed = [name for name in PEERS if find_spec(name)]
     try:
         motion = ArmMotion(setup)
     except PeerError as error:
         return [], [f"other programs ({', '.join(installed)}): {error}"]
     methods: list[MethodUnderTest] = []
-    left_out = [f"{name}: is not installed" for name in PEERS if name not in installed]
+    left_out = [f"{name}: not installed" for name in PEERS if name not in installed]
     for name in installed:
         try:
             if name in _FREE_MOTION_ONLY and not motion.free:

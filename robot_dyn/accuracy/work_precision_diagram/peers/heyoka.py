@@ -68,5 +68,5 @@ def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) 
         elif (function := two.get(op.kind) if len(operands) == 2 else one.get(op.kind)) is not None:
             values[op.results[0]] = function(*operands)
         else:
-            raise PeerError(f"the operation {op.kind.name.lower()} of the equations is not translated")
+            raise PeerError(f"the operation {op.kind.name.lower()} is not supported")
     return [values[i] for i in program.outputs[: len(y)]]
