@@ -51,7 +51,8 @@ def budget(
 
     Compare the demand on each motor with its limits, by cause. The exit code is 1 if a motor is too small.
     With --fastest it is 1 if a motor is too small for the given motion or for the fastest one.
-    Show torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
+    Show torque and speed peaks, rms torque, power, energy, the torque at which dry friction breaks away, and the loads
+    on the bearings of the joints.
 
     Options:
         source (ROBOT|SCENE.toml|RUN.npz): A robot, with a plan; a scene, which is simulated; or a run file.

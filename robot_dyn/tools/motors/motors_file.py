@@ -29,7 +29,7 @@ _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")
 # units of columns with their factors, including units of prismatic joints
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0}
-_FORCE, _MOMENT = {"N": 1.0}, {"N m": 1.0, "Nm": 1.0}
+_FORCE, _MOMENT = {"N": 1.0, "kN": 1e3}, {"N m": 1.0, "Nm": 1.0}
 _SPEED = {"rad/s": 1.0, "m/s": 1.0, "rpm": pi / 30, "deg/s": pi / 180}
 _INERTIA = {"kg m^2": 1.0, "kg m²": 1.0, "kg": 1.0, "kg cm^2": 1e-4, "kg cm²": 1e-4, "g cm^2": 1e-7, "g cm²": 1e-7}
 _UNITS: Mapping[str, Mapping[str, float]] = {
