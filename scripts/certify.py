@@ -16,7 +16,7 @@ from benchmarks.measure import command_line
 import robot_dyn as rd
 from robot_dyn.foundations.result import plain
 
-MOST_JOINTS = 12
+MAX_JOINTS = 12
 IMPLEMENTATIONS = (
     "Pinocchio", "Lagrangian, float32", "Lagrangian, float64", "Lagrangian, longdouble", "articulated body",
     "machine code",
@@ -26,11 +26,11 @@ Document = dict[str, Any]  # of a certificate
 
 
 def arms() -> list[str]:
-    """Robots of the catalog with at most MOST_JOINTS joints."""
+    """Robots of the catalog with at most MAX_JOINTS joints."""
     names = []
     for name in rd.list_robots():
         try:
-            names += [name] * (rd.load(name).n <= MOST_JOINTS)
+            names += [name] * (rd.load(name).n <= MAX_JOINTS)
         except rd.RobotDynError as error:
             print(f"{name}: {error}")
     return names
@@ -74,7 +74,7 @@ def of_quantities(documents: dict[str, Document]) -> None:
 if __name__ == "__main__":
     warnings.simplefilter("ignore", rd.ModelWarning)
     parser = command_line(__doc__, "one robot and 100 states: to see that it works")
-    parser.add_argument("robots", nargs="*", help=f"names; all with up to {MOST_JOINTS} joints unless given")
+    parser.add_argument("robots", nargs="*", help=f"names; all with up to {MAX_JOINTS} joints unless given")
     parser.add_argument("--keep", type=Path, help="file of results, a line for each robot; a later call continues it")
     options = parser.parse_args()
     lines = options.keep.read_text().splitlines() if options.keep and options.keep.exists() else []

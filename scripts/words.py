@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 0,
     "each": 0,
     "arguments": 0,
-    "Any": 177,
+    "Any": 172,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -288,5 +288,5 @@ def test_curves_keep_their_peaks_and_leave_out_what_is_not_finite() -> None:
     page = read(f"<div>{display.plot('x [m]', t, {'x': x})}</div>")
     (curve,) = curves_of(page)
     heights = curve[:, 1].tolist()
-    assert len(heights) <= display.MOST_POINTS and heights.count(min(heights)) == 1
+    assert len(heights) <= display.MAX_POINTS and heights.count(min(heights)) == 1
     assert display.plot("x", t, {"x": np.full_like(t, np.nan)}) == ""

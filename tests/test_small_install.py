@@ -13,7 +13,7 @@ TOUR = Path(__file__).parents[1] / ".ci" / "small.py"
 BLOCKED = """import runpy, sys
 from importlib import metadata
 missing = {"scipy", "casadi", "llvmlite", "matplotlib", "pydantic", "pydantic_core", "trimesh", "typer", "rich",
-    "yourdfpy", "flint", "PIL", "meshcat", "zmq", "tornado", "umsgpack", "collada"}
+    "yourdfpy", "flint", "PIL", "meshcat", "collada"}
 class Without:
     def __init__(self, finder):
         self.finder = finder

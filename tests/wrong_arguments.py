@@ -287,7 +287,7 @@ def examples(folder: Path) -> dict[str, Example]:
             time=[0.0, 1.0, 2.0], joints={"slide": "slide", "hinge": "hinge"}, unit="rad", ends="measured", q0=q,
             start_s=0.5, topic=None),
         call(rd.control.external_torque, arm=robot, t=[0.0, 1.0], q=[q, q], v=[v, v], tau=[u, u], bandwidth_rad_s=9.0,
-            effects=plant.torque, rest_s=(0.0, 1.0), held=True),
+            effects=plant.torque, rest_s=(0.0, 1.0), zero_order_hold=True),
         call(rd.control.gains_from, inertia_diagonal=[1.0, 2.0], bandwidth_rad_s=3.0, damping_ratio=0.9),
         call(rd.control.hold, q=q),
         call(rd.control.inverse_kinematics, arm=robot, pose=robot.placement(q, "pole"), frame="pole", q0=q, seed=1,

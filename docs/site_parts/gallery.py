@@ -63,6 +63,6 @@ def made_by(path: Path, sources: str) -> tuple[Path, Path]:
     if not still.exists():
         document = runpy.run_path(str(path))["page"].document
         KEPT.mkdir(parents=True, exist_ok=True)
-        page_file.write_text(page_text({**document, "live": False}, viewer=VIEWER), encoding="utf-8")
+        page_file.write_text(page_text(document, viewer=VIEWER), encoding="utf-8")
         still.write_bytes(picture(document))  # last: then both are there
     return page_file, still

@@ -2,7 +2,7 @@
 
     work_precision     error against time of every method and of other programs (WorkPrecision)
     certify            true digits of M, C, N, inverse and forward dynamics, against balls (Certificate)
-    digits             correct digits of one answer; warn_below: a robot whose queries warn of few
+    digits             correct digits of one answer; warn_below: a robot whose queries warn of too few
     cost               instructions and times of effects, control and algorithms (Cost)
     Ball               an arithmetic of numbers with a radius; midpoint, radius
 

@@ -2,8 +2,7 @@
 
 Stability is a property of the method and of the loop, not of the duration; the growth of deviations over the run is
 reported separately. The Jacobian J and the linearised sampled loop are evaluated at the fastest states of a pilot run
-with continuous control. A motion that departs from these states may be stable with longer steps, or unstable with
-shorter ones.
+with continuous control. A motion away from these states may be stable with longer steps, or unstable with shorter ones.
 """
 
 from __future__ import annotations
@@ -102,7 +101,7 @@ class Advice(Answer):
 
     @reported
     def text(self) -> str:
-        """Step, control period, growth over the run, error and fastest motion, a line for each."""
+        """Step, control period, growth over the run, error and fastest motion, one line each."""
         parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
         return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at_s:.3g} s"]))
 
@@ -157,7 +156,7 @@ class Advice(Answer):
             verdict = f"; the loop is stable up to {limit:.3g} s" if isfinite(limit) else "; every period is stable"
         if marginal and self.period_s <= limit:
             verdict = (
-                f"; no deviation grows up to a period of {limit:.3g} s"
+                f"; no deviation grows for periods up to {limit:.3g} s"
                 if isfinite(limit)
                 else "; no deviation grows at any period"
             )
@@ -218,7 +217,7 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     """
     plant, controller, duration = setup.plant, setup.controller, setup.duration_s
     if plant.equation_of_motion.payloads:
-        raise QueryError("advise: carried_payload changes the bodies during the run; use plant.at(t), t in [s]")
+        raise QueryError("advise: carried_payload changes the bodies during the run; use plant.at(t), with t in s")
     if coupled := [x.name for x in plant.equation_of_motion.drives.values() if x.coupled]:
         raise QueryError(f"advise: {coupled[0]} couples and releases motors in turn; no single linearisation is valid")
     period = 0.0 if controller is None else controller.period_s

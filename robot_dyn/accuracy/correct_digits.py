@@ -1,7 +1,7 @@
 """Correct digits of an answer, −log10(error), counted against true values in balls.
 
 An error is relative to the scale of the answer, in the units √M_ii of the joints (`lagrange.exact`). Before digits are
-counted it is estimated, as 8 n u κ times the ratio of the terms of the answer to the answer (`lagrange.magnitude`).
+counted, the error is estimated as 8 n u κ times the ratio of the answer's terms to the answer (`lagrange.magnitude`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import QUANTITIES as QUERIES
-from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.quantity import MAX_DIGITS, Quantity
 
 QUANTITIES = {name: quantity for name, quantity in QUERIES.items() if quantity.digits}
 
@@ -40,7 +40,7 @@ def _unchecked(robot: Robot) -> Robot:
 
 def digits_of(error: float) -> float:
     """Return −log10 of an error, limited to 0…20; 0 for nan."""
-    return min(max(-log10(max(error, RESOLUTION)), 0.0), float(MOST_DIGITS)) if error == error else 0.0
+    return min(max(-log10(max(error, RESOLUTION)), 0.0), float(MAX_DIGITS)) if error == error else 0.0
 
 
 def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
@@ -65,8 +65,8 @@ def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
     requested = QUANTITIES[choice("quantity", quantity, QUANTITIES)]
     if len(state) != len(requested.arguments):
         raise QueryError(
-            f"digits of {requested.name} need the arguments {', '.join(requested.arguments)}; got {len(state)}"
-            f" arguments"
+            f"digits of {requested.name} need the arguments {', '.join(requested.arguments)}, got {len(state)}"
+            " arguments"
         )
     arrays = {
         name: np.array(shaped(name, x, robot.joint_names), float)
@@ -92,7 +92,7 @@ def warn_below(robot: Robot, digits: float | None) -> Robot:
     Raises:
         QueryError: If an argument is invalid.
     """
-    robot = instance("robot", robot, Robot, "give one of rd.load")
+    robot = instance("robot", robot, Robot, "give a robot, for example rd.load('ur5')")
     if digits is None:
         return robot if robot.answer_check is None else replace(robot, answer_check=None)
     return replace(robot, answer_check=DigitCheck(digits))
@@ -104,15 +104,15 @@ class DigitCheck:
     """A check of answers that warns of too few correct digits.
 
     Attributes:
-        digits: The number of digits below which it warns.
+        digits: Number of digits below which it warns.
     """
 
     digits: float
 
     def __post_init__(self) -> None:
         digits = number("digits", self.digits, above=0)
-        if digits > MOST_DIGITS:
-            raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}")
+        if digits > MAX_DIGITS:
+            raise QueryError(f"digits must be at most {MAX_DIGITS}, got {digits:g}")
         object.__setattr__(self, "digits", digits)
 
     def __call__(self, robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:
@@ -163,4 +163,4 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
 
 def _counted(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
     """Return the digits of one query, counted against its true value."""
-    return digits_of(_exact(robot).at(quantity, state).error(quantity.ask(robot, state)))
+    return digits_of(_exact(robot).at(quantity, state).error(quantity.evaluate(robot, state)))

@@ -1,4 +1,4 @@
-"""Difference of two runs of one robot: by joint, with the time at which they part and the settings that differ."""
+"""Difference of two runs of one robot: by joint, with the time at which they diverge and the settings that differ."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ class RunDifference(Result):
         samples: Number of times at which the runs are compared.
         common: Number of these times at which both runs have a sample; at the others one run is interpolated in q.
         fraction: Fraction of the time from start_s to end_s that was compared.
-        interpolation: Largest interpolation error that is allowed for, in the unit of q; 0 without interpolation.
+        interpolation: Allowance for interpolation errors, in the unit of q; 0 without interpolation.
         parted_s: First time at which q differs by more than the errors of the runs, in [s]; None if it never does.
         judged_until_s: Time up to which the errors of both runs are known, in [s].
         bound: The threshold beyond which the runs part, in words.
         settings: The settings that differ.
-        left_out: Notes on everything that was not compared.
+        left_out: Notes on omitted comparisons.
         environment: Software versions of the first run.
         runs: The two runs.
         difference: The difference at all times of comparison.
@@ -99,7 +99,7 @@ class RunDifference(Result):
         if self.parted_s is not None:
             return f"{a} and {b} part at t = {self.parted_s:.4g} s: q differs by more than {self.bound}"
         if not self.is_conclusive:
-            return f"{a} and {b} were compared over {self.fraction:.0%} of the time only: record both at the same times"
+            return f"{a} and {b} were compared over only {self.fraction:.0%} of the time; record both at the same times"
         end = (
             ""
             if self.judged_until_s >= self.end_s
@@ -156,7 +156,7 @@ def diff_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERA
         QueryError: If the runs are of different robots, or have no time in common.
     """
     for name, run in (("a", a), ("b", b)):
-        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.read, or a run of rollouts")
+        instance(name, run, TrajectoryData, "give a trajectory of rd.simulate or rd.read, or a run of rollouts")
     tolerance = number("tolerance", tolerance, above=0, error=QueryError)
     differences, types = difference(a, b, tolerance), joint_types(a)
     unit_of_q, (first, second) = joint_units("q", types), run_names(a, b)

@@ -121,7 +121,7 @@ def bar(
 
         def advance(done: float, current: str = description) -> None:
             ended = total is not None and done >= total
-            if done < display.tasks[0].completed:  # the work starts again, for example after pilot runs
+            if done < display.tasks[0].completed:  # the work restarts, for example after pilot runs
                 display.reset(task)
             display.update(task, completed=done, description=at_the_end if ended and at_the_end else current)
 

@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 
 def scene(source: str, robot_options: Mapping[str, object]) -> Setup | None:
-    """The setup of a scene file; None for a robot. QueryError for options that a scene states itself."""
+    """Return the setup of a scene file, or None for a robot; raise QueryError for options that only robots have."""
     import robot_dyn as rd
 
     if not source.lower().endswith(".toml"):
         return None
     if of_robots := [name for name, value in robot_options.items() if value]:
-        raise QueryError(f"{of_robots[0]}: applies to a robot; a scene defines its own, so remove it")
+        raise QueryError(f"{of_robots[0]} applies to robots only, because a scene states it itself; remove it")
     return rd.read_scene(source)
 
 
 def run(path: str) -> Trajectory:
-    """Return the run of a file; QueryError for a batch."""
+    """Return the run in a file; raise QueryError for a batch."""
     import robot_dyn as rd
 
     result = rd.read(path)
@@ -40,7 +40,7 @@ def run(path: str) -> Trajectory:
 
 
 def assignments(option: str, texts: list[str], kind: str = "joint") -> dict[str, float]:
-    """Values by joint, or link, of several joint=value; QueryError if one comes twice."""
+    """Return values by joint, or by link, from texts NAME=VALUE; raise QueryError if a name occurs twice."""
     values = {name: number(option, value) for name, value in pairs(option, texts, f"{kind.upper()}=VALUE").items()}
     if len(values) < len(texts):
         raise QueryError(f"{option} names a {kind} twice: {', '.join(texts)}")
@@ -57,22 +57,22 @@ def pairs(option: str, texts: list[str] | None, form: str = "NAME=VALUE") -> dic
 
 
 def payload(text: str) -> Payload:
-    """A body on a link of LINK=MASS@X,Y,Z, in kg and m; its centre of mass is the origin of the link without @."""
+    """Return the payload of LINK=MASS@X,Y,Z, in kg and m; without @, its centre of mass is the origin of the link."""
     from robot_dyn.description.edits import Payload
 
     link, equals, body = text.rpartition("=")
     mass, place = _placed(body)
     if not (equals and link.strip()) or place is None:
-        raise QueryError(f"--payload must be LINK=MASS@X,Y,Z in kg and m, as tool0=5kg@0,0,0.1; got {text!r}")
+        raise QueryError(f"--payload must be LINK=MASS@X,Y,Z in kg and m, such as tool0=5kg@0,0,0.1; got {text!r}")
     com = tuple(number("--payload, place in m", entry) for entry in place)
     return Payload(link.strip(), number("--payload, mass in kg", mass.strip().removesuffix("kg")), com)  # pyright: ignore[reportArgumentType]
 
 
 def link_and_place(option: str, text: str) -> tuple[str, tuple[float, ...]]:
-    """A link and a place on it of LINK@X,Y,Z, in m; its origin without @."""
+    """Return the link and the point of LINK@X,Y,Z, in m; without @, the point is the origin of the link."""
     link, place = _placed(text)
     if not link.strip() or place is None:
-        raise QueryError(f"{option} must be LINK@X,Y,Z in m, as tool0@0,0,0.1; got {text!r}")
+        raise QueryError(f"{option} must be LINK@X,Y,Z in m, such as tool0@0,0,0.1; got {text!r}")
     return link.strip(), tuple(number(f"{option}, place in m", entry) for entry in place)
 
 
@@ -84,7 +84,7 @@ def _placed(text: str) -> tuple[str, list[str] | None]:
 
 
 def number(option: str, text: str) -> float:
-    """The number that a text states."""
+    """Convert a text to a number."""
     try:
         return float(text)
     except ValueError:
@@ -92,7 +92,7 @@ def number(option: str, text: str) -> float:
 
 
 def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.ndarray:
-    """Numbers separated by commas or blanks, one for each joint; or joint=value pairs, 0 elsewhere."""
+    """Return one number per joint, from numbers separated by commas or blanks, or from joint=value pairs, else 0."""
     import numpy as np
 
     words = (text or "").replace(",", " ").split()

@@ -17,36 +17,36 @@ _MOVES = re.compile(
 
 
 def robots(incomplete: str) -> list[str]:
-    """Names of robots in the catalog."""
+    """Return names of robots in the catalog."""
     return [name for name in list_robots() if name.startswith(incomplete)]
 
 
 def scenes(incomplete: str) -> list[str]:
-    """Names of starter scenes."""
+    """Return names of starter scenes."""
     from robot_dyn.scene.starters import starter_names
 
     return [name for name in starter_names() if name.startswith(incomplete)]
 
 
 def quantities(incomplete: str) -> list[str]:
-    """Names of the queries of a robot."""
+    """Return names of the queries of a robot."""
     from robot_dyn.queries.dynamics import QUANTITIES
 
     return [name for name in QUANTITIES if name.startswith(incomplete)]
 
 
 def joints(incomplete: str) -> list[str]:
-    """Names of the movable joints of the robot named on the command line."""
+    """Return names of the movable joints of the robot on the command line."""
     return [name for name in _joints() if name.startswith(incomplete)]
 
 
 def locks(incomplete: str) -> list[str]:
-    """Names of the movable joints, each followed by `=`."""
+    """Return names of the movable joints, each followed by `=`."""
     return [f"{name}=" for name in joints(incomplete)]
 
 
 def _joints() -> list[str]:
-    """Movable joints of the first robot on the command line, which shells pass in environment variables."""
+    """Return movable joints of the first robot on the command line, which shells pass in environment variables."""
     line = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
     for word in line.split()[2:]:
         with suppress(RobotDynError):

@@ -10,13 +10,13 @@ _AGAIN_S = 0.02
 
 
 def guard() -> None:
-    """From now on Ctrl-C raises KeyboardInterrupt, after any import in progress; unless it is ignored."""
+    """Let Ctrl-C raise KeyboardInterrupt, after any import in progress, unless it is ignored."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell ignores it in background processes
         signal.signal(signal.SIGINT, _interrupt)
 
 
 def ignore() -> None:
-    """From now on Ctrl-C does nothing: the command has ended, and the interpreter shuts down."""
+    """Ignore Ctrl-C: the command has ended, and the interpreter shuts down."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -28,6 +28,7 @@ from robot_dyn.foundations.errors import ModelWarning, QueryError
 from robot_dyn.foundations.files import target
 
 if TYPE_CHECKING:
+    from robot_dyn.description.edits import Changes
     from robot_dyn.model.robot import Robot
 
 Name = Annotated[
@@ -39,7 +40,7 @@ Name = Annotated[
     ),
 ]
 Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
-Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
+Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, without compiling.")]
 Repeats = Annotated[int, typer.Option(min=1, help="Largest number of timings of each, within the budget.")]
 Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
@@ -49,7 +50,7 @@ Effects = Annotated[str | None, typer.Option(help='"urdf" adds the friction that
 Payloads = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="LINK=MASS@X,Y,Z", help="Add a body to a link, in kg and m, as tool0=5kg@0,0,0.1; may be repeated."
+        metavar="LINK=MASS@X,Y,Z", help="Add a body to a link, such as tool0=5kg@0,0,0.1 (m); may be repeated."
     ),
 ]
 
@@ -58,14 +59,14 @@ Payloads = Annotated[
 class FileOptions:
     """Options for reading a URDF or MJCF file; None where absent.
 
-    With a mass, a total mass or a density, links without inertia get that of their shape.
+    With a mass, a total mass or a density, inertias of links without one are estimated from their shapes.
 
     Options:
         package_dir: Folder in which ROS packages are searched; may be repeated.
         xacro (NAME=VALUE): Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.
         mass (LINK=KG): Mass of a link without inertia; its shape gives the inertia; may be repeated.
-        total_mass (KG): Mass of the robot, shared by links without inertia, from shapes.
-        density (KG/M³): Density of links without inertia, from shapes.
+        total_mass (KG): Mass of the robot, shared among links without inertia by their shapes.
+        density (KG/M³): Density of links without inertia.
         allow_overlap: Count the volume that closed parts of a mesh share once for each part.
     """
 
@@ -78,7 +79,7 @@ class FileOptions:
 
     @property
     def stated(self) -> dict[str, object]:
-        """Value by option, of those that are given."""
+        """Values of the options that are given, by name."""
         values = {field: getattr(self, field.name) for field in fields(self)}
         stated = {field.name: value for field, value in values.items() if value not in (field.default, [])}
         return {f"--{name.replace('_', '-')}": value for name, value in stated.items()}
@@ -103,11 +104,13 @@ class RobotOptions(FileOptions):
 
     Options:
         lock (JOINT=VALUE): Lock a joint at a value in rad or m; may be repeated.
-        without (WHAT,…): Parts left out of MJCF: tendon, equality, free, ball.
+        without (PART,…): Parts of an MJCF file to omit: tendon, equality, free, ball.
+        gravity (X,Y,Z): Gravity in base axes, in m/s²; 0,0,9.81 on a ceiling.
     """
 
     lock: Annotated[list[str] | None, typer.Option(autocompletion=completion.locks)] = None
     without: str | None = None
+    gravity: str | None = None
 
     def load(self, name: str, *, quiet: bool = False) -> Robot:
         """Return the robot of a name or path; `quiet` suppresses its warnings."""
@@ -120,7 +123,12 @@ class RobotOptions(FileOptions):
                 warnings.simplefilter("ignore", ModelWarning)
             inertia = "from_shapes" if estimated else "stated"
             robot = rd.load(name, inertia=inertia, without=without, **self.reading)
-        return robot.with_(lock=arguments.assignments("--lock", self.lock)) if self.lock else robot
+        changes: Changes = {}
+        if self.gravity is not None:
+            changes["gravity"] = arguments.vector("--gravity", self.gravity, ("x", "y", "z"))
+        if self.lock:
+            changes["lock"] = arguments.assignments("--lock", self.lock)
+        return robot.with_(**changes) if changes else robot
 
 
 @final
@@ -139,22 +147,22 @@ class Results:
     force: Force = False
     as_json: Json = False
 
-    def files(self, of: type, *inputs: str | None) -> list[Path]:
-        """Return the paths to write a figure and a table of a class of results to, checked before the work is done."""
+    def files(self, result_type: type, *inputs: str | None) -> list[Path]:
+        """Check, before any work, the paths of the figure and the table of a class of results; return them."""
         from robot_dyn.report.figure import ResultError
         from robot_dyn.report.result import REPORT, table_kind
         from robot_dyn.view.plots.pictures import PICTURES
 
         if self.dark and not self.output:
-            raise QueryError("--dark applies to a figure: add --output PLOT.png, or remove --dark")
+            raise QueryError("--dark applies to figures only; add --output PLOT.png, or remove --dark")
         read, paths = [path for path in inputs if path and os.path.isfile(path)], []
-        for path, kinds in ((self.output, (*PICTURES, REPORT)), (self.csv, table_kind(of))):
+        for path, kinds in ((self.output, (*PICTURES, REPORT)), (self.csv, table_kind(result_type))):
             if path:
                 paths.append(target(path, kinds, ResultError, [*read, *paths], self.force))
         return paths
 
     def give(self, result: Any, paths: Iterable[Path], drawn: Any = None, first: str = "", **more: Any) -> None:
-        """Write a result, or the one that is `drawn`, and show it after a first line, with more answers by key."""
+        """Write a result, or `drawn` instead, and print it after a first line, with more answers by key."""
         theme = "dark" if self.dark else "light"
         writes = [partial((drawn or result).save, path, theme=theme) for path in paths]
         show([first, "", result] if first else result, document=result, as_json=self.as_json, more=more, writes=writes)
@@ -169,9 +177,9 @@ _SHORT = {"output": ("-o",)}
 
 
 def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function of keywords alone, as typer takes it: options are described, and groups stand as their fields.
+    """Return the function for typer, with keywords only: options have descriptions, and groups become their fields.
 
-    Parameters before `/` are arguments. "name (VALUE): text" in a docstring describes a parameter or field, and VALUE.
+    Parameters before `/` are arguments. A line "name (VALUE): text" in a docstring describes a parameter or field.
     """
     stated, groups, parameters = inspect.signature(function).parameters.values(), dict[str, Any](), []
     arguments = [parameter.name for parameter in stated if parameter.kind is parameter.POSITIONAL_ONLY]
@@ -198,7 +206,7 @@ def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _described(parameter: inspect.Parameter, *where: Any) -> inspect.Parameter:
-    """Return a parameter as typer takes it, with what the docstrings of a function or of classes state of it."""
+    """Return a parameter for typer, with its description in the docstrings of a function or of classes."""
     name, default = parameter.name, parameter.default
     annotation = get_type_hints(where[-1], include_extras=True)[name]
     docstrings = "\n".join(inspect.cleandoc(source.__doc__ or "") for source in where)

@@ -148,7 +148,7 @@ def run(trajectory: Trajectory) -> RunDocument:
 
 
 def _extremes(trajectory: Trajectory) -> Document | None:
-    """The least and the largest of each quantity over all steps, by joint."""
+    """Return the smallest and largest value of each quantity over all steps, by joint."""
     if trajectory.extremes is None:
         return None
     return {
@@ -161,7 +161,7 @@ def _extremes(trajectory: Trajectory) -> Document | None:
 
 
 def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Iterator[Any]:
-    """One robot quantity by quantity, or several a line each with the worst."""
+    """Yield the table of one robot, or one line for each of several robots with the worst quantity."""
     agreed = f"{sum(result.ok for _, result in results)} of {len(results)} agree"
     if len(results) == 1:
         yield from results[0][1].blocks()
@@ -186,7 +186,7 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
 
 
 def formulations(robot: Robot) -> Document:
-    """For each quantity the instructions of each formulation, and the one that is compiled."""
+    """Return the number of instructions of each formulation by quantity, and the compiled formulation."""
     from robot_dyn.codegen.dynamics import CompiledDynamics
     from robot_dyn.codegen.trace import trace
 
@@ -199,7 +199,7 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
     """Return the answers of the rigid bodies at a state to queries of the table, by name.
 
     Raises:
-        QueryError: If there is no such query or frame, a query needs a frame, or none uses the given one.
+        QueryError: If there is no such query or frame, a query lacks its frame, or no query uses the frame.
     """
     framed = [name for name, quantity in QUANTITIES.items() if quantity.framed]
     if frame is not None and not set(names) & set(framed) and set(names) <= set(QUANTITIES):
@@ -209,8 +209,8 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
         quantity = QUANTITIES[choice("quantity", name, QUANTITIES)]
         frames = [frame] if quantity.framed and frame else []
         if quantity.framed and not frames:
-            raise QueryError(f"{name} refers to a frame: add --frame LINK")
-        answers[name] = quantity.ask(state.plant.dynamics, vars(state), *frames)
+            raise QueryError(f"{name} needs a frame; add --frame LINK")
+        answers[name] = quantity.evaluate(state.plant.dynamics, vars(state), *frames)
     return answers
 
 
@@ -226,7 +226,7 @@ def query_lines(answers: Document, joints: Sequence[str], types: Sequence[str]) 
 
 
 def formulation_table(answer: Document) -> Iterator[Any]:
-    """`formulations` as a table."""
+    """Yield the table of `formulations`."""
     rows = []
     for name, row in answer.items():
         counts = dict(row["instructions"])
@@ -239,7 +239,7 @@ def formulation_table(answer: Document) -> Iterator[Any]:
 
 
 def demo_tables(robot: Robot) -> Iterator[Any]:
-    """A robot, its dynamics at a general state, and the cross-check."""
+    """Yield a robot, its dynamics at a general state, and the cross-check."""
     yield info(robot)
     q, v, a = np.round(np.random.default_rng(7).uniform(-1, 1, (3, robot.n)), 2)
     yield ""

@@ -1,4 +1,4 @@
-"""Output of the command line: no control characters of files, no traceback for a closed pipe or a full disk."""
+"""Output of the command line: without control characters from files, or tracebacks for closed pipes and full disks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robot_dyn.foundations.errors import RobotDynError, escaped
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-_MOST = 4000  # characters of a message
+_MAX = 4000  # largest number of characters in a message
 
 
 class OutputError(RobotDynError):
@@ -132,7 +132,7 @@ def to_stderr(text: str) -> None:
     """Write one line to standard error, if there is one."""
     line = escaped(text)
     try:
-        print(line if len(line) <= _MOST else line[: _MOST - 1] + "…", file=sys.stderr, flush=True)
+        print(line if len(line) <= _MAX else line[: _MAX - 1] + "…", file=sys.stderr, flush=True)
     except OSError:
         _drop(sys.stderr)
 
@@ -181,12 +181,12 @@ def failed(error: OSError) -> OutputError:
 
 
 def _drop(stream: Any) -> None:
-    """Discard what a stream still has in its buffer, and all that is written to it later."""
+    """Discard the buffer of a stream, and everything written to it later."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
 
 
 def _json_escaped(letter: str) -> str:
-    """The letter, or its JSON escape if it is a control character."""
+    """Return the letter, or its JSON escape if it is a control character."""
     return letter if escaped(letter) == letter else json.dumps(letter)[1:-1] if ord(letter) != 127 else "\\u007f"

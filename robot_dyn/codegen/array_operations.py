@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _POINTER = F64.as_pointer()
 _NUMBERS = 32, 8, 4, 1  # sums computed at a time, in registers
-NOTHING = StaticValue(None)
+NEGLIGIBLE = StaticValue(None)
 
 
 def emits(handler: Callable[..., Value]) -> Callable[..., Value]:
@@ -89,13 +89,13 @@ def evaluation(f: Function, node: ast.AST, function: Scalar, t: Scalar, *arrays_
         shape = ir.FunctionType(ir.VoidType(), [F64, *[_POINTER] * len(arrays_)])
         pointer = f.builder.inttoptr(converted(f, function, INT, node).ir, shape.as_pointer())
         f.builder.call(pointer, [converted(f, t, FLOAT, node).ir, *(argument.data for argument in arrays_)])
-    return NOTHING
+    return NEGLIGIBLE
 
 
 @emits
 def _require(f: Function, node: ast.AST, holds: Scalar, message: StaticValue) -> Value:
     f.check(truth(f, holds), node, str(message.value))
-    return NOTHING
+    return NEGLIGIBLE
 
 
 @emits
@@ -117,7 +117,7 @@ def _weighted_sum(
     if not all(array.kind.contiguous for array in (x, y, weights, K)):
         raise f.refused(node, "a combination of arrays that are not contiguous", "copy them first")
     if f.silent:
-        return NOTHING
+        return NEGLIGIBLE
     b, h = f.builder, real(f, h, node)
     stage = K.strides(b)[0].ir
     for width, e in vectors.chunks(f, arrays.size(f, y), _NUMBERS):
@@ -146,7 +146,7 @@ def _weighted_sum(
         b.position_at_end(done)
         moved = b.fmul(so_far, vectors.spread(b, h.ir, width, FLOAT))
         vectors.stored(b, b.fadd(vectors.loaded(b, y.data, e, width, FLOAT), moved), x.data, e, width, FLOAT)
-    return NOTHING
+    return NEGLIGIBLE
 
 
 def _in_place(rule: vectors.Rule) -> Callable[..., Value]:
@@ -155,7 +155,7 @@ def _in_place(rule: vectors.Rule) -> Callable[..., Value]:
     @emits
     def handler(f: Function, node: ast.AST, x: ArrayValue, *others: Value) -> Value:
         vectors.elementwise(f, node, x, [x, *others], rule)
-        return NOTHING
+        return NEGLIGIBLE
 
     return handler
 
@@ -172,7 +172,7 @@ def copying(f: Function, node: ast.AST, to: ArrayValue, x: ArrayValue) -> Value:
         vectors.elementwise(f, node, to, [x], lambda b, x: x)
     else:
         _copied(f, to, x, [])
-    return NOTHING
+    return NEGLIGIBLE
 
 
 def _copied(f: Function, to: ArrayValue, x: ArrayValue, indices: list[Scalar]) -> None:
@@ -187,7 +187,7 @@ def _copied(f: Function, to: ArrayValue, x: ArrayValue, indices: list[Scalar]) -
 def multiplication(f: Function, node: ast.AST, x: ArrayValue, y: Value, out: ArrayValue) -> Value:
     """Set out to x y, for an array and another array or a number."""
     vectors.elementwise(f, node, out, [x, y], lambda b, x, y: b.fmul(x, y))
-    return NOTHING
+    return NEGLIGIBLE
 
 
 @emits
@@ -196,7 +196,7 @@ def _sum_sizes(f: Function, node: ast.AST, x: ArrayValue, out: ArrayValue) -> Va
         raise f.refused(node, "a sum over arrays that are not contiguous", "copy them first")
     b, (rows, W) = f.builder, x.shape
     if not isinstance(b, ir.IRBuilder):
-        return NOTHING
+        return NEGLIGIBLE
     for width, e in vectors.chunks(f, W, vectors.WIDTHS):
         lanes = Vectors(b, F64, width)
         with b.goto_entry_block():
@@ -206,7 +206,7 @@ def _sum_sizes(f: Function, node: ast.AST, x: ArrayValue, out: ArrayValue) -> Va
             values = vectors.loaded(b, x.data, b.add(b.mul(k, W.ir), e), width, FLOAT)
             b.store(b.fadd(b.load(total), lanes.intrinsic("fabs", values)), total)
         vectors.stored(b, b.load(total), out.data, e, width, FLOAT)
-    return NOTHING
+    return NEGLIGIBLE
 
 
 @emits

@@ -21,7 +21,7 @@ from robot_dyn.codegen.trace.trace import QUANTITIES, Trace, keyed
 from robot_dyn.description.inertial_parameters import Parametrised
 from robot_dyn.foundations.validate import JointValues, choice, instance, truth
 from robot_dyn.foundations.values import OnFirstUse
-from robot_dyn.model.right_angles import RightAngle, completed
+from robot_dyn.model.right_angles import RightAngle, with_exact_right_angles
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.batch import into
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Axes, Dynamics, NanRows
@@ -76,7 +76,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
 
     @cached_property
     def _completed(self) -> tuple[Robot, tuple[RightAngle, ...]]:
-        return completed(self.original)
+        return with_exact_right_angles(self.original)
 
     @property
     def robot(self) -> Robot:
@@ -161,7 +161,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
             y = empty(shape, self._vector[1]) if out is None else out
             if not self._ones[name](*state, y):
                 return y
-        return self.engine.ask(name, state, out, nan, self._otherwise(name))
+        return self.engine.evaluate(name, state, out, nan, self._otherwise(name))
 
     def _of_frame(self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...], nan: bool) -> Any:
         """Return a query of a frame: a batch by machine code, otherwise by Pinocchio."""
@@ -171,7 +171,7 @@ class CompiledDynamics(_Derivatives, Parametrised):
             return into(out, np.asarray(answer, self.dtype))
         link = self.robot.description.joint_frames.get(frame[0], frame[0])
         key = name, link, *map(str, map(Axes.from_name, frame[1:]))
-        return self.engine.ask(key, state, out, nan, self._otherwise(key))
+        return self.engine.evaluate(key, state, out, nan, self._otherwise(key))
 
     # --- queries that take half a microsecond and skip `_answer`
 

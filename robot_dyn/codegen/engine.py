@@ -1,6 +1,6 @@
 """Engine of a compiled robot or plant: each quantity is traced, compiled and checked on first use.
 
-A quantity at one state is one call of machine code. `ask` handles everything else: lists, batches, and states for
+A quantity at one state is one call of machine code. `evaluate` handles everything else: lists, batches, and states for
 which the kernel reports doubt or an error.
 """
 
@@ -113,14 +113,14 @@ class Engine:
         if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
             return True
         warnings.warn(
-            f"{title(quantity)} needs {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
-            f" {self.self_check.name} computes it, which is slower",
+            f"{title(quantity)} needs {count} instructions, too many to compile (limit {LARGEST_KERNEL});"
+            f" {self.self_check.name} computes it, more slowly",
             SizeWarning,
             stacklevel=2,
         )
         return False
 
-    def ask(
+    def evaluate(
         self,
         quantity: Key,
         arguments: tuple[ArrayLike, ...],
@@ -277,5 +277,5 @@ class Engine:
 
 
 def _never(*_: Any) -> int:
-    """Stand in for a kernel that is not worthwhile, so that `ask` takes over."""
+    """Replace a kernel that is not worthwhile: `evaluate` takes over."""
     return Status.SHAPE

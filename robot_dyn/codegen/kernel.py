@@ -43,7 +43,7 @@ class Kernel:
         shape: Shape of the result for one state.
         dtype: "float64" or "float32".
         times: True if the first input is a time: a number in `call`, (B, 1) in `many`.
-        doubtful: Results whose absolute values sum to more are reported.
+        doubtful: Limit of the sum of absolute results; larger results are reported.
         store: Store of compiled code, or None.
         about: Description for readers of the store.
         parameters: Numbers shared by all states, (P,); kernels that differ only in these run the same code.

@@ -136,7 +136,7 @@ def _of_part(part: object, place: Part, prefix: str, n: int, path: str = "") -> 
         value = getattr(part, key)
         if value is not None:
             value = np.asarray(value, dtype=float)
-            value = np.broadcast_to(value, (n,)) if coefficient.of_joints else value
+            value = np.broadcast_to(value, (n,)) if coefficient.is_per_joint else value
             yield Parameter(place, path + key, prefix + key, value, coefficient, tuple(range(value.size)))
 
 
@@ -256,7 +256,7 @@ def _literal(values: Any) -> Any:
 
 
 def with_numbers(dynamics: Dynamics, values: Mapping[str, Scalar]) -> Dynamics:
-    """Return the robot of a dynamics with other numbers; the dynamics itself without any."""
+    """Return the robot of a dynamics object with other numbers; the object itself if there are none."""
     if not values:
         return dynamics
     robot: Any = getattr(dynamics, "robot", dynamics)

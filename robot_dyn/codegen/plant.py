@@ -28,16 +28,16 @@ from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import MissingTimeError
-from robot_dyn.foundations.names_nearest import NamesNearest
+from robot_dyn.foundations.suggestions import SuggestsNames
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import EQUATION, PLANT, Dynamics
 from robot_dyn.queries.quantity import Key, title
 
-_TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
+_TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.evaluate` handles all others
 
 
 @dataclass(frozen=True)
-class CompiledPlant(NamesNearest):
+class CompiledPlant(SuggestsNames):
     """A plant as machine code; each quantity is compiled on first use and checked against the interpreted plant.
 
     Attributes:
@@ -176,11 +176,11 @@ class CompiledPlant(NamesNearest):
         def otherwise(t: float, *state: Any) -> Any:
             return getattr(self.interpreted, quantity)(*state, t=t)
 
-        return self.engine.ask(quantity, arguments, out, self.is_nan_allowed, otherwise)
+        return self.engine.evaluate(quantity, arguments, out, self.is_nan_allowed, otherwise)
 
     @cached_property
     def _rigid(self) -> Dynamics[np.ndarray]:
-        """Rigid bodies; raises a TraceError if a payload comes or goes."""
+        """Rigid bodies; raises a TraceError if a payload is picked up or dropped."""
         _ = self._symbolic
         return self.dynamics.nan_rows if self.is_nan_allowed else self.dynamics
 

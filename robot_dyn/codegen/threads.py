@@ -1,4 +1,4 @@
-"""Work shared by threads: a free thread takes the next piece, so that a slow one delays no other."""
+"""Work shared by threads: each free thread takes the next piece, so that slow threads do not delay others."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import final
 
 from robot_dyn.foundations.validate import integer
 
-_MOST_THREADS = 4096
+_MAX_THREADS = 4096
 
 
 def thread_count(threads: int | None) -> int:
@@ -21,7 +21,7 @@ def thread_count(threads: int | None) -> int:
     """
     if threads is None:
         return os.cpu_count() or 1
-    return integer("threads (None for all processors)", threads, least=1, most=_MOST_THREADS)
+    return integer("threads (None for all processors)", threads, least=1, most=_MAX_THREADS)
 
 
 def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int) -> int:
@@ -45,7 +45,7 @@ def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int
 
 @final
 class _Pool:
-    """Pool of waiting threads, as many as were ever needed at once; starting one takes as long as a thousand states."""
+    """Pool of waiting threads, because starting a thread takes as long as evaluating a thousand states."""
 
     def __init__(self) -> None:
         self._lock, self._size, self._threads = threading.Lock(), 0, ThreadPoolExecutor(1)

@@ -1,4 +1,4 @@
-"""Torque from a reference and a measured state: each controller owns its model of the arm and never sees the plant.
+"""Torque from a reference and a measured state: each controller has its own model of the arm, not the plant.
 
     joint by joint     PD, PID; gains_from: gains from a bandwidth and a damping ratio
     with a model       ComputedTorque, PDGravity, FeedForward

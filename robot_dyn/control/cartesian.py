@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-_MOST_TURNS = 1000
+_MAX_TURNS = 1000
 _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp, for the accuracy stated in `circle`
 
 
@@ -54,7 +54,7 @@ class CartesianReference(Reference):
         if self.angle is not None and not isinstance(self.angle, PiecewisePolynomial):
             raise ControlError(f"angle must be a PiecewisePolynomial of 1 coordinate, got {shown(self.angle)}")
         if self.angle is not None and (self.rotation is None or self.angle.n != 1):
-            raise ControlError("angle must have 1 coordinate and needs a rotation R₀ to turn")
+            raise ControlError("angle must have 1 coordinate and needs an initial orientation, rotation")
         if self.rotation is not None:
             object.__setattr__(self, "rotation", _rotation("rotation", self.rotation))
         object.__setattr__(self, "axis", _direction("axis", self.axis))
@@ -94,7 +94,7 @@ def line(
     rotation_end: ArrayLike | None = None,
     start_s: float = 0.0,
 ) -> CartesianReference:
-    """Return the straight line from p0 to p1 and the shortest turn between two orientations, as minimum-jerk motions.
+    """Return a minimum-jerk motion along the line from p0 to p1, with the shortest rotation between two orientations.
 
     Args:
         p0: Start, shape (3,), in [m].
@@ -113,7 +113,7 @@ def line(
     position = quintic(p0, p1, duration_s, start_s=start_s)
     if rotation is None or rotation_end is None:
         if rotation_end is not None:
-            raise ControlError("rotation_end needs a rotation to start from")
+            raise ControlError("rotation_end needs rotation, the orientation at the start")
         return CartesianReference(position, rotation)
     turn = orientation_error(_rotation("rotation_end", rotation_end), _rotation("rotation", rotation))
     angle = np.linalg.norm(turn)
@@ -137,8 +137,8 @@ def circle(
 ) -> CartesianReference:
     """Return a circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
 
-    The pieces match p, ṗ, p̈ at 64 or more knots per turn; between knots the distance from the centre is off by less
-    than 1e-9 of the radius. The speed rises and falls over `ramp_s` as the minimum-jerk quintic, so the motion lasts
+    The pieces match p, ṗ, p̈ at 64 or more knots per turn; between knots the radius is off by less than 1e-9 of its
+    value. The speed rises and falls over `ramp_s` as a minimum-jerk quintic, so the motion lasts
     turns · period_s + ramp_s.
 
     Args:
@@ -161,8 +161,8 @@ def circle(
     """
     centre, r, normal = numbers("centre", centre, (3,)), number("radius", radius, above=0), _direction("normal", normal)
     T, turns = duration("period_s", period_s, error=ControlError), number("turns", turns, above=0)
-    if turns > _MOST_TURNS:
-        raise ControlError(f"turns must be at most {_MOST_TURNS}, got {turns:g}; each turn takes {_TURN_KNOTS} pieces")
+    if turns > _MAX_TURNS:
+        raise ControlError(f"turns must be at most {_MAX_TURNS}, got {turns:g}; each turn takes {_TURN_KNOTS} pieces")
     rise = number("ramp_s", min(T / 4, turns * T) if ramp_s is None else ramp_s, least=0)
     if rise > turns * T:
         raise ControlError(f"ramp_s must be at most turns · period_s = {turns * T} s, got {rise} s")

@@ -122,7 +122,7 @@ class ComputedTorque(ModelBased):
 
 @final
 class PDGravity(ModelBased):
-    """PD with gravity compensation: τ = kp e + kd ė + N(q); asymptotically stable at rest if N is exact.
+    """PD with gravity compensation: τ = kp e + kd ė + N(q); asymptotically stable at a rest position if N is exact.
 
     Source: Siciliano et al. 2009, sec. 8.5.1; Takegaki and Arimoto, 1981.
     """

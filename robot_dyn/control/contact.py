@@ -26,7 +26,7 @@ from robot_dyn.queries.units import of_joint
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-_APART = 5.0  # time constants in a block: maxima of neighbouring blocks are nearly independent
+_APART = 5.0  # smallest block in time constants, so that maxima of neighbouring blocks are nearly independent
 _HOUR_S = 3600.0
 
 
@@ -63,7 +63,7 @@ class AlarmThreshold(Answer, ReadOnly):
         block_count: Number B of blocks of the log.
         block_s: Length of a block, in [s].
         level: Confidence level of the interval.
-        low: Lower end of the interval of the alarms per hour in fresh logs of such motions.
+        low: Lower end of the interval of alarms per hour in new logs of such motions.
         high: Upper end of this interval.
     """
 
@@ -143,7 +143,7 @@ class ExternalTorque(Answer, ReadOnly):
         return tuple(contacts)
 
     def block_maxima(self, block_s: float = 1.0) -> np.ndarray:
-        """Return the largest |r| of each joint in consecutive blocks, (B, n); the last, incomplete one is left out.
+        """Return the largest |r| of each joint in consecutive blocks, (B, n); an incomplete last block is omitted.
 
         Args:
             block_s: Length of a block, in [s]; at least 5/K, so that neighbours are nearly independent.
@@ -161,7 +161,7 @@ class ExternalTorque(Answer, ReadOnly):
         count = min(int(length / block_s * (1 + 1e-12)), len(self.t))
         starts = np.searchsorted(self.t, self.t[0] + block_s * np.arange(count + 1) * (1 - 1e-12))
         if (np.diff(starts) == 0).any():
-            raise ControlError(f"block_s: blocks of {block_s:g} s have no samples; use longer blocks, or mend the log")
+            raise ControlError(f"block_s: some blocks of {block_s:g} s have no samples; use longer blocks")
         return np.maximum.reduceat(np.abs(self.torque[: starts[-1]]), starts[:-1], axis=0)
 
     def threshold(
@@ -169,8 +169,8 @@ class ExternalTorque(Answer, ReadOnly):
     ) -> AlarmThreshold:
         """Compute the threshold of a log without contact, from its block maxima.
 
-        The interval of the alarms per hour assumes independent blocks, and motions and noise like those of the log. The
-        scales of the joints are taken from the same log, so it is approximate for few blocks.
+        The interval of alarms per hour assumes independent blocks, and motions and noise like those of the log. It is
+        approximate for few blocks, because the scales of the joints come from the same log.
 
         Args:
             alarms_per_hour: Upper end of the interval; None for the largest value of the log as the threshold.
@@ -200,7 +200,7 @@ class ExternalTorque(Answer, ReadOnly):
                 needed = np.log((1 - level) / 2) / min(np.log1p(-wanted / per_hour), -1e-300) * block_s
                 raise ControlError(
                     f"alarms_per_hour = {wanted:g} needs a log of {np.ceil(needed):.6g} s without contact, got"
-                    f" {count * block_s:g} s: record longer, or allow {highs[0]:.3g}"
+                    f" {count * block_s:g} s; record longer, or allow {highs[0]:.3g}"
                 )
         interval = binomtest(k, count).proportion_ci(level, "exact")
         low, high = float(interval.low) * per_hour, float(interval.high) * per_hour

@@ -85,7 +85,7 @@ class Controller(Value, ABC):
 
     @property
     def parts(self) -> tuple[Nested, ...]:
-        """The controllers and blocks inside it, nested ones included; () for a plain control law."""
+        """The controllers and blocks inside it, including nested ones; () for a plain control law."""
         return ()
 
     @property
@@ -107,7 +107,7 @@ class Controller(Value, ABC):
 
     @property
     def desired(self) -> Reference | None:
-        """The reference that a run is compared with: the first one, or None."""
+        """The reference that a run is compared with: the first, or None if there is none."""
         return next(iter(self.references.values()), None)
 
     @property
@@ -123,8 +123,8 @@ class Controller(Value, ABC):
     def thresholds(self) -> tuple[Threshold, ...]:
         """Return the levels of `demand` at which it switches between smooth formulas; () if it is smooth everywhere.
 
-        A class that does not define this method makes no claim; see `Effect.thresholds`. In continuous control,
-        integration steps end where a level is passed.
+        If a class does not define this method, its smoothness is unknown; see `Effect.thresholds`. In continuous
+        control, integration steps end where a level is passed.
         """
         return ()
 
@@ -164,9 +164,9 @@ class Controller(Value, ABC):
             ControlError: If the class defines neither method, or only `next_state` without a period.
         """
         if not self._has_only_next_state:
-            raise ControlError(f"{self.name} has states: define state_rate(t, q, v, z), or next_state and a period_s")
+            raise ControlError(f"{self.name} has states; define state_rate(t, q, v, z), or next_state and a period_s")
         if not self.period_s:
-            raise ControlError(f"{self.name} defines only next_state, so it is a sampled law: give it a period_s")
+            raise ControlError(f"{self.name} defines only next_state, so it is a sampled law; give it a period_s")
         return (self.next_state(t, q, v, z) - z) / self.period_s
 
     @property
@@ -196,7 +196,7 @@ class Controller(Value, ABC):
 
     @property
     def deviates(self) -> int:
-        """Number of states at the end of z that are standard normal deviates, drawn again before each tick."""
+        """Number of states at the end of z that are standard normal deviates, redrawn before each tick."""
         return 0
 
     @property
@@ -291,10 +291,10 @@ def check_model(model: object) -> None:
 
 
 def check_joints(part: object, n: int, where: str = "") -> None:
-    """Raise a ControlError if a coefficient of joints is neither one number nor one number for each of n joints."""
+    """Raise a ControlError if a coefficient per joint is neither a scalar nor of shape (n,)."""
     for name, declared_as in declared(type(part)).items():
         shape = np.shape(getattr(part, name))
-        if declared_as.of_joints and shape not in ((), (n,)):
+        if declared_as.is_per_joint and shape not in ((), (n,)):
             raise ControlError(f"{where}{name} must be one number or of shape ({n},), got {shape}")
 
 
@@ -306,15 +306,15 @@ def check_sampled(name: str, controller: object) -> None:
         )
     if controller.outermost:
         raise ControlError(
-            f"{name} must not be a {type(controller).__name__}: pass its inner controller, and put the loop around the"
+            f"{name} must not be a {type(controller).__name__}; pass its inner controller, and put the loop around the"
             " outermost controller"
         )
     if not controller.period_s > 0:
-        raise ControlError(f"{name} is continuous, but a loop is sampled: give {controller.name} a period_s")
+        raise ControlError(f"{name} is continuous, but a loop is sampled; give {controller.name} a period_s")
 
 
 def nested(controller: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
-    """Return a controller that is an attribute of another one, and the parts of it."""
+    """Return a controller that is an attribute of another one, and its parts."""
     part: Controller = getattr(controller, attribute)
     below = (Nested(f"{attribute}.{path}", f"{label}{inner}", x) for path, inner, x in part.parts)
     return Nested(attribute, label, part), *below
@@ -325,7 +325,7 @@ def nested(controller: Controller, attribute: str, label: str) -> tuple[Nested, 
 class ControlLaw(Stateless):
     """A function (t, q, v) → τ as a continuous controller.
 
-    A model of the arm inside a function cannot be traced: make it an attribute of a `Stateless` controller.
+    A model of the arm inside a function cannot be traced; make it an attribute of a `Stateless` controller.
 
     Attributes:
         function: Function that returns the torque of each joint, shape (n,), in [N m] or [N].

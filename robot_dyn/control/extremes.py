@@ -1,8 +1,8 @@
 """Extremes of piecewise polynomials, at the zeros of a derivative and at the ends of pieces; no grid is used.
 
-A polynomial is monotonic between two neighbouring zeros of its derivative, so bisection finds its zeros: degree by
-degree, beginning with the linear derivative. The Bernstein coefficients of a polynomial enclose its values, so only a
-few pieces of a long motion must be examined.
+A polynomial is monotonic between neighbouring zeros of its derivative, so bisection finds its zeros, degree by degree,
+from the linear derivative up. The Bernstein coefficients of a polynomial enclose its values, so only a few pieces of a
+long motion must be examined.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ROUNDING = 1e-12  # relative to the largest coefficient
 
 
 class Extremes(NamedTuple):
-    """The smallest and the largest value of each joint, and their times in [s], all (n,)."""
+    """Smallest and largest value of each joint, and their times in [s], all (n,)."""
 
     least: np.ndarray
     greatest: np.ndarray

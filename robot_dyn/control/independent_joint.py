@@ -22,7 +22,7 @@ from robot_dyn.foundations.coefficients import (
     with_values,
 )
 from robot_dyn.foundations.errors import ControlError, shown
-from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.foundations.saturation import initial_middle, limit_thresholds, piece, saturated
 from robot_dyn.foundations.threshold import Threshold, smooth
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class PID(Controller):
         τ = sat(u),   u = kp e + kd ė + z,   ż = ki e + (sat(u) − u)/T_t
 
     so that at a constant error z settles at sat(u) + T_t ki e − kp e − kd ė instead of growing. Sampled, this is stable
-    for period < 2 T_t.
+    if the period is less than 2 T_t.
 
     Attributes:
         reference: q_d(t) of the n joints.
@@ -107,7 +107,7 @@ class PID(Controller):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "_middle", middle_of(self.effort_limit))
+        object.__setattr__(self, "_middle", initial_middle(self.effort_limit))
         if self.tracking_time_s is None:
             kd, ki = np.broadcast_arrays(self.kd, self.ki)
             acts = (kd > 0) & (ki > 0)
@@ -131,7 +131,7 @@ class PID(Controller):
         return self.effort_limit
 
     def thresholds(self) -> tuple[Threshold, ...]:
-        return limits_reached(self.effort_limit, self._middle, self.n)
+        return limit_thresholds(self.effort_limit, self._middle, self.n)
 
     def on_side(self, sides: Mapping[Threshold, int]) -> PID:
         limit, middle = piece(self.effort_limit, self.n, sides)
@@ -178,7 +178,8 @@ def gains_from(
     omega = numbers("bandwidth_rad_s", bandwidth_rad_s, *shapes, above=0)
     zeta = numbers("damping_ratio", damping_ratio, *shapes, least=0)
     if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
-        raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
+        shapes_text = f"{inertia.shape}, {omega.shape}, {zeta.shape}"
+        raise ControlError(f"shapes of inertia_diagonal, bandwidth_rad_s, damping_ratio differ: {shapes_text}")
     with np.errstate(over="ignore"):
         kp, kd = inertia * omega**2, 2 * zeta * omega * inertia
     return numbers("kp = M_ii ω²", kp, (), ("n",)), numbers("kd = 2 ζ ω M_ii", kd, (), ("n",))

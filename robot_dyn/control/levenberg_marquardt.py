@@ -2,9 +2,8 @@
 
     d = Jᵀ (J Jᵀ + λ 1)⁻¹ e,   λ = μ ‖e‖²,   q⁺ = min(max(q + d, lower), upper)
 
-J has columns only for free joints, without joints that Jᵀ e pushes against a bound. μ decreases after steps that
-reduce e as J predicts, and increases after others (Nielsen). If e tends to 0, λ tends to 0 as its square, so
-convergence is quadratic.
+J omits the columns of joints that Jᵀ e pushes against a bound. μ decreases after steps that reduce e as J predicts, and
+increases after others (Nielsen). As e tends to 0, λ tends to 0 like its square, so convergence is quadratic.
 
 [Yamashita, Fukushima, On the rate of convergence of the Levenberg–Marquardt method, 2001; Kanzow, Yamashita, Fukushima,
 Levenberg–Marquardt methods with strong local convergence properties for solving nonlinear equations with convex
@@ -19,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 _START = 1e-2  # initial μ
-_LEAST, _MOST = 1e-12, 1e16  # range of μ; above it, no step descends
+_MIN, _MAX = 1e-12, 1e16  # range of μ; above it, no step descends
 _ROUNDING = 1e-13  # relative to the trace of J Jᵀ: keeps the solve regular if rows of J are dependent
 
 Residual = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -58,18 +57,18 @@ def descend(
     e, J = residual(q, rows)
     mu, factor, iterations = np.full(len(q), _START), np.full(len(q), 2.0), np.ones(len(q), int)
     for _ in range(1, most):
-        rows = rows[(_square(e[rows]) > tolerance**2) & (mu[rows] < _MOST)]
+        rows = rows[(_square(e[rows]) > tolerance**2) & (mu[rows] < _MAX)]
         if not len(rows):
             break
         here, old, slope = q[rows], e[rows], J[rows]
-        there = np.clip(here + _step(here, old, slope, lower, upper, mu[rows]), lower, upper)
-        new, slope_there = residual(there, rows)
-        predicted = _square(old) - _square(old - (slope @ (there - here)[..., None])[..., 0])
+        trial = np.clip(here + _step(here, old, slope, lower, upper, mu[rows]), lower, upper)
+        new, slope_trial = residual(trial, rows)
+        predicted = _square(old) - _square(old - (slope @ (trial - here)[..., None])[..., 0])
         gain = (_square(old) - _square(new)) / np.where(predicted > 0, predicted, np.inf)
         good = gain > 0
-        q[rows[good]], e[rows[good]], J[rows[good]] = there[good], new[good], slope_there[good]
+        q[rows[good]], e[rows[good]], J[rows[good]] = trial[good], new[good], slope_trial[good]
         change = np.where(good, np.maximum(0.1, 1 - (2 * gain - 1) ** 3), factor[rows])
-        mu[rows] = np.maximum(mu[rows] * change, _LEAST)
+        mu[rows] = np.maximum(mu[rows] * change, _MIN)
         factor[rows] = np.where(good, 2.0, 2 * factor[rows])
         iterations[rows] += 1
     return Descent(q, e, J, iterations)

@@ -39,8 +39,8 @@ _AT_REST = 0.01  # [rad] or [m]: largest motion of a joint at rest
 class MomentumObserver(Enclosing):
     """A sampled controller with an observer of the external torque, updated at each tick: ṙ = K (τ_ext − r).
 
-    The inner controller computes the torque. It acts from tick to tick, so its integral is exact. In a `Loop`, the
-    observer receives the measured positions and velocities. `recorded` returns r of a run.
+    The inner controller computes the torque, which is constant between ticks, so its integral is exact. In a `Loop`,
+    the observer receives the measured positions and velocities. `recorded` returns r of a run.
 
     Attributes:
         controller: A sampled controller.
@@ -100,7 +100,7 @@ class MomentumObserver(Enclosing):
         return np.concatenate([inside, r, p_now, rate_now, u_now, np.ones(1)])
 
     def recorded(self, t: ArrayLike, z: ArrayLike | None) -> ExternalTorque:
-        """Return the external torque of a run: pass `run.t` and `run.controller_states`, also of a loop around it.
+        """Return the external torque of a run from `run.t` and `run.controller_states`, also if a loop encloses it.
 
         Raises:
             ControlError: If the states are not those of this observer.
@@ -131,11 +131,11 @@ def external_torque(
     bandwidth_rad_s: ArrayLike,
     effects: Torque | None = None,
     rest_s: tuple[float, float] | None = None,
-    held: bool = False,
+    zero_order_hold: bool = False,
 ) -> ExternalTorque:
     """Compute the external torque on the joints from a log, by the generalised momentum observer.
 
-    Its sign agrees with the joint torque: M a + C v + N = τ + τ_ext. Friction that `effects` leaves out appears in it.
+    Its sign is that of the joint torque: M a + C v + N = τ + τ_ext. Friction missing from `effects` appears in it.
 
     Args:
         arm: The robot.
@@ -148,8 +148,8 @@ def external_torque(
             gravity only.
         rest_s: Interval (from, to) without contact and motion, in [s]; the mean external torque in it is the offset,
             which is subtracted. None for no offset.
-        held: True if each torque acts until the next sample, as commands of a controller do; False if torques are
-            samples of a sensor.
+        zero_order_hold: True if each torque acts until the next sample, like commands of a controller; False if
+            torques are samples of a sensor.
 
     Raises:
         ControlError: If an array has the wrong shape or unit, times do not increase, or the arm moves in `rest_s`.
@@ -159,16 +159,16 @@ def external_torque(
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=ControlError)
     t = numbers("t", t, ("m",), error=ControlError)
     if len(t) < 2 or not (np.diff(t) > 0).all():
-        raise ControlError("t must be at least two times, each later than the one before; sort the log, drop repeats")
+        raise ControlError("t must have at least two increasing times; sort the log and remove duplicates")
     shape = len(t), arm.n
     q, v, tau = (numbers(*x, shape, error=ControlError) for x in (("q", q), ("v", v), ("tau", tau)))
     K = numbers("bandwidth_rad_s", bandwidth_rad_s, (), (arm.n,), above=0, error=ControlError)
     function("effects", effects, _EFFECTS, error=ControlError)
-    held = truth("held", held, error=ControlError)
+    zero_order_hold = truth("zero_order_hold", zero_order_hold, error=ControlError)
     h, p, rate = np.diff(t)[:, None], _momentum(arm, q, v), _rate(arm, q, v)
     if effects is not None:
         rate = rate + numbers("effects(q, v)", effects(q, v), shape, error=ControlError)
-    acting = tau[:-1] if held else (tau[:-1] + tau[1:]) / 2
+    acting = tau[:-1] if zero_order_hold else (tau[:-1] + tau[1:]) / 2
     external = np.diff(p, axis=0) / h - (rate[:-1] + rate[1:]) / 2 - acting
     offset = np.zeros(arm.n) if rest_s is None else _offset(t, q, external, rest_s)
     decay = np.exp(-K * h)
@@ -184,7 +184,7 @@ def _momentum(model: Dynamics, q: Array, v: Array) -> Array:
 
 
 def _rate(model: Dynamics, q: Array, v: Array) -> Array:
-    """Return the part of ṗ that the model gives: Cᵀ v − N."""
+    """Return the part of ṗ that follows from the model: Cᵀ v − N."""
     return model.coriolis_transpose(q, v) - model.N(q)
 
 
@@ -194,7 +194,8 @@ def _offset(t: np.ndarray, q: np.ndarray, external: np.ndarray, rest_s: tuple[fl
     rests = (t >= start) & (t <= end)
     if rests.sum() < 2:
         raise ControlError(
-            f"rest_s: {rests.sum()} samples from {start:g} to {end:g} s; the log is from {t[0]:g} to {t[-1]:g} s"
+            f"rest_s: only {rests.sum()} samples from {start:g} to {end:g} s, at least 2 are needed; the log is from"
+            f" {t[0]:g} to {t[-1]:g} s"
         )
     moved = float(np.ptp(q[rests], axis=0).max())
     if moved > _AT_REST:

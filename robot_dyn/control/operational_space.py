@@ -79,8 +79,8 @@ def task_dynamics(
 
         s/ε² = s/(s² + λ²),   λ² = ε² − s²,
 
-    which keeps Λ below 1/ε and gives zero force at the singularity itself, where no force can act. The other
-    directions stay exact. Metres and radians have equal weight.
+    which keeps Λ below 1/ε and gives zero force at the singularity itself, where no force can act. Other directions
+    remain exact. Metres and radians have equal weight.
 
     Args:
         dynamics: The arm.
@@ -171,13 +171,15 @@ class OperationalSpace(Stateless):
         free = self.reference.rotation is None
         rows = _rows((POSITION if free else POSE) if self.rows is None else self.rows)
         if free and max(rows) > 2:
-            raise ControlError(f"rows {rows} include the orientation, which the reference leaves free; use rows 0 to 2")
+            raise ControlError(
+                f"rows {rows} include the orientation, but the reference leaves it free; use rows 0 to 2"
+            )
         self.model.jacobian(np.zeros(self.n), self.frame)  # reports an unknown frame now, not during a run
         object.__setattr__(self, "rows", rows)
         if self.posture is None:
             object.__setattr__(self, "posture", np.zeros(self.n))
             if np.any(self.posture_kp):
-                raise ControlError("posture_kp needs a posture: give both, or neither")
+                raise ControlError("posture_kp needs a posture; give both or neither")
         super().__post_init__()
         for name, *shapes in (("kp", (), (len(rows),)), ("kd", (), (len(rows),)), ("posture", (self.n,))):
             numbers(name, getattr(self, name), *shapes)

@@ -31,7 +31,7 @@ def rotation_vector(R: Array) -> Array:
     """
     w, x = _quaternion(_matrices("R", R))
     length = sqrt((x * x).sum(axis=-1, keepdims=True))
-    # θ/‖x‖ → 2 where there is no turn; np.where keeps this free of branches
+    # θ/‖x‖ → 2 for small angles; np.where avoids branches
     small = length < 1e-150
     ratio = np.where(small, 2, 2 * np.arctan2(length, np.abs(w)) / np.where(small, 1, length))
     return np.where(w < 0, -1, 1) * ratio * x

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from robot_dyn.foundations.validate import JointValues
 
 
-_SOUGHT = 1e-11  # largest ‖e‖ of a descent, in [m] and [rad]: below usual tolerances, above rounding
+_SOUGHT = 1e-11  # ‖e‖ at which a descent ends, in [m] and [rad]: below usual tolerances, above rounding
 _ROTATION = 1e-6  # largest entry of RᵀR − 1 for a rotation
 _SAME = 1e-4  # [rad] or [m]: solutions closer than this count as one
 _FAR = 100.0  # [m]: a pose further away may be in [mm]
@@ -45,7 +45,7 @@ _RANK = 1e-9  # relative to the largest entry of J
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class InverseKinematics(Answer, ReadOnly):
-    """The joint positions that bring a frame to a pose, or as near to it as the search came.
+    """Joint positions that bring a frame to a pose, or the nearest that the search found.
 
     Attributes:
         arm: Name of the arm.
@@ -58,7 +58,7 @@ class InverseKinematics(Answer, ReadOnly):
         rotation_error: Angle between the frame and the pose at q, in [rad]; for a direction, the angle between it and
             the tool axis; nan if the orientation is free.
         converged: True if both errors are within the tolerance.
-        held_by: Limits that keep the frame from coming nearer to the pose, in words; empty if it converged.
+        limited_by: Limits that keep the frame from coming nearer to the pose, as text; empty if it converged.
         solutions: All solutions, the nearest to q0 first, (k, n).
         starts: Number of starts.
         first: Number of the first start that converged, from 1; 0 if none did.
@@ -75,7 +75,7 @@ class InverseKinematics(Answer, ReadOnly):
     position_error: float
     rotation_error: float
     converged: bool
-    held_by: tuple[str, ...]
+    limited_by: tuple[str, ...]
     solutions: np.ndarray = field(repr=False)
     starts: int
     first: int
@@ -98,13 +98,13 @@ class InverseKinematics(Answer, ReadOnly):
         if not self.converged:
             far = f"; it is {self.position_error:.4g} m away: if the pose is in mm, give it in m"
             free = f"out of reach; no joint limit is active{far if self.position_error > _FAR else ''}"
-            yield f"held by {', '.join(self.held_by)}" if self.held_by else free
+            yield f"limited by {', '.join(self.limited_by)}" if self.limited_by else free
             if not np.isnan(self.rotation_error):
                 yield "q minimises the sum of both squared errors, where 1 rad counts as 1 m"
             if self.moving_joints < self.conditions == 6:
                 yield f"{self.moving_joints} joints move {self.frame}, and its pose has 6 conditions"
                 yield "if the tool may spin about its axis, give the direction of this axis instead of the rotation"
-            yield f"best of {self.starts} starts; to be surer, give q0 near a solution, or more starts"
+            yield f"best of {self.starts} starts; if in doubt, give q0 near a solution, or more starts"
             return
         others = len(self.solutions) - 1
         free = f"; {self.redundancy} direction{'s' * (self.redundancy != 1)} of motion left" if self.redundancy else ""
@@ -132,8 +132,8 @@ def inverse_kinematics(
     counts as much as 1 m.
 
     A direction instead of a rotation leaves the spin about the tool axis free: for arms with five axes, and for tools
-    that may spin, such as torches. Elsewhere this is the mask (1, 1, 1, 1, 1, 0) in tool axes, or a tolerance of π
-    about the z axis. None instead of a rotation is the mask (1, 1, 1, 0, 0, 0), or position-only inverse kinematics.
+    that may spin, such as torches. Other software calls this the mask (1, 1, 1, 1, 1, 0) in tool axes, or a tolerance
+    of π about the z axis. None instead of a rotation is the mask (1, 1, 1, 0, 0, 0): position-only inverse kinematics.
 
     Args:
         arm: The robot.
@@ -147,7 +147,7 @@ def inverse_kinematics(
         starts: Number of starts, including q0.
         tolerance: Largest error of position, in [m], and of rotation, in [rad], at a solution.
         iterations: Largest number of evaluations for each start.
-        tool_axis: Axis of the frame that a direction applies to, in frame axes, (3,).
+        tool_axis: Axis of the frame that is aligned with a given direction, in frame axes, (3,).
 
     Raises:
         PlanError: If the pose is invalid, or q0 is outside the limits.
@@ -201,7 +201,7 @@ def _shortest(a: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Compute the rotation vectors of the shortest rotations that take a unit vector to others, (B, 3)."""
     turn = np.cross(a, d)
     sine = np.linalg.norm(turn, axis=-1, keepdims=True)
-    # to the opposite direction, all axes orthogonal to a are as short
+    # for opposite directions, any axis orthogonal to a will do
     axis = np.where(sine > 0, turn / np.where(sine > 0, sine, 1), _orthogonal(a[None])[0])
     return np.arctan2(sine, (d @ a)[..., None]) * axis
 
@@ -237,17 +237,19 @@ def _best(
     order = good[np.argsort(np.abs(q[good] - start).max(axis=1), kind="stable")]
     best = order[0] if len(order) else int((descent.e**2).sum(axis=1).argmin())
     J = descent.J[best]
-    held_by = () if len(order) else _limits(arm, q[best], at_bound(q[best], descent.e[best], J, arm.lower, arm.upper))
+    limited_by = (
+        () if len(order) else _limits(arm, q[best], at_bound(q[best], descent.e[best], J, arm.lower, arm.upper))
+    )
     rank = int(np.linalg.matrix_rank(J, tol=_RANK * np.abs(J).max(initial=0.0)))
     return InverseKinematics(
         *(arm.name, arm.joint_names, arm.joint_types, frame, q[best], float(length[best]), float(angle[best])),
-        *(bool(len(order)), held_by, _distinct(q[order]), len(q), int(good[0]) + 1 if len(good) else 0),
+        *(bool(len(order)), limited_by, _distinct(q[order]), len(q), int(good[0]) + 1 if len(good) else 0),
         *(moving - rank, moving, len(J)),
     )
 
 
 def _distinct(solutions: np.ndarray) -> np.ndarray:
-    """Return the first solution of each group of equal ones."""
+    """Return the first solution of each group of nearly equal ones."""
     distinct = solutions[:0]
     for solution in solutions:
         if (np.abs(distinct - solution).max(axis=1) > _SAME).all():
@@ -256,7 +258,7 @@ def _distinct(solutions: np.ndarray) -> np.ndarray:
 
 
 def _limits(arm: Robot, q: np.ndarray, blocked: np.ndarray) -> tuple[str, ...]:
-    """Return the limits that hold joints, in words."""
+    """Return the active limits, as text."""
     rows = zip(arm.joint_names, arm.joint_types, q, arm.lower, blocked, strict=True)
     return tuple(
         f"the {'lower' if x <= low else 'upper'} limit of {name}, {x:.6g} {of_joint('rad', kind)}"
@@ -319,7 +321,7 @@ def _moving(arm: Robot, frame: str, rng: np.random.Generator) -> np.ndarray:
 def _nearest_turns(arm: Robot, q: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Return positions (B, n) with angles in the turn nearest to the start, within the limits.
 
-    Joints that others follow by a ratio are left as they are: a whole turn would move the others.
+    Joints that others follow by a ratio other than 1 are not changed: a whole turn would move the others.
     """
     S = arm.couplings.S
     alone = ((S != 0).sum(axis=0) == 1) & ((S == 1).sum(axis=0) == 1)

@@ -1,6 +1,6 @@
 """Desired motions as piecewise polynomials: q(t) = Σⱼ cᵢⱼ (t − tᵢ)ʲ on tᵢ ≤ t ≤ tᵢ₊₁.
 
-Every reference is such a table, so one evaluator serves all of them, traced or not.
+Every reference consists of such tables, so one evaluator serves all of them, traced or not.
 Each piece is the Hermite polynomial of the values and derivatives at its two ends. [Siciliano et al. 2009, ch. 4]
 """
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 _DERIVATIVES = {"cubic": 1, "quintic": 2}  # number of prescribed derivatives at each end, by kind of spline
-_MOST_POINTS = 2000  # steps of a run end at each of them; more are samples of a measurement
+_MAX_POINTS = 2000  # steps of a run end at each point; use `Samples` for measurements
 _MISSED = 1e-6  # relative to the largest sample: far above rounding, far below the error of a failed spline
 _FACTORIALS = np.array([factorial(j) for j in range(6)], dtype=float)
 # The inverse of [j!/(j − r)!] with r < m ≤ j < 2m: maps the remainder of the low half at s = 1 to the high half.
@@ -140,13 +140,13 @@ def hold(q: JointValues, *, joint_names: Sequence[str] | None = None) -> Piecewi
     """Return a reference at rest at q.
 
     Args:
-        q: Position, shape (n,), in [rad] or [m]; or by joint name, 0 for joints left out.
+        q: Position, shape (n,), in [rad] or [m]; or by joint name, 0 for omitted joints.
         joint_names: Joints in the order of q, such as `arm.joint_names`; required for values by joint name.
 
     Raises:
         ControlError: If q has another shape, or names an unknown joint.
     """
-    return PiecewisePolynomial([0.0, 1.0], _of_joints("q", q, joint_names, ("n",))[None, None])
+    return PiecewisePolynomial([0.0, 1.0], _joint_numbers("q", q, joint_names, ("n",))[None, None])
 
 
 @np.errstate(all="ignore")  # the check for finite values catches overflow
@@ -168,8 +168,8 @@ def quintic(
     at 15/8 · (q1 − q0)/duration_s.
 
     Args:
-        q0: Initial position, shape (n,), in [rad] or [m]; like all values of joints, also by joint name, 0 for joints
-            left out.
+        q0: Initial position, shape (n,), in [rad] or [m]; like all values of joints, also by joint name, 0 for omitted
+            joints.
         q1: Final position, shape (n,).
         duration_s: Duration, in [s], positive.
         start_s: Start time, in [s].
@@ -185,10 +185,10 @@ def quintic(
     Source: Siciliano et al. 2009, sec. 4.2.1; Flash and Hogan, The coordination of arm movements, 1985.
     """
     T, begin = duration("duration_s", duration_s, error=ControlError), number("start_s", start_s)
-    first = _of_joints("q0", q0, joint_names, ("n",))
-    last = _of_joints("q1", q1, joint_names, first.shape)
+    first = _joint_numbers("q0", q0, joint_names, ("n",))
+    last = _joint_numbers("q1", q1, joint_names, first.shape)
     rates = {"v0": v0, "a0": a0, "v1": v1, "a1": a1}
-    v, a, v_end, a_end = (_of_joints(name, x, joint_names, (), first.shape) for name, x in rates.items())
+    v, a, v_end, a_end = (_joint_numbers(name, x, joint_names, (), first.shape) for name, x in rates.items())
     ends = np.stack(np.broadcast_arrays(first, v, a, last, v_end, a_end))
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
@@ -205,7 +205,7 @@ def via_points(
 
     Args:
         times_s: Increasing times, shape (k + 1,), in [s].
-        points: Shape (k + 1, n), in [rad] or [m]; like velocities, also by joint name, 0 for joints left out: a list
+        points: Shape (k + 1, n), in [rad] or [m]; like velocities, also by joint name, 0 for omitted joints: a list
             of such points, or (k + 1,) by joint.
         kind: "quintic" or "cubic".
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
@@ -218,21 +218,23 @@ def via_points(
     Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
     """
     kind = choice("kind of spline", kind, _DERIVATIVES, error=ControlError)
-    rows = _of_joints("points", points, joint_names, ("k + 1", "n"))
+    rows = _joint_numbers("points", points, joint_names, ("k + 1", "n"))
     if len(rows) < 2:
-        raise ControlError(f"points: at least 2 are needed, got {len(rows)}; to rest at one point, use hold(q)")
-    if len(rows) > _MOST_POINTS:
-        raise ControlError(f"points: at most {_MOST_POINTS} are allowed, got {len(rows)}; use rd.control.Samples")
+        raise ControlError(f"points: at least 2 are needed, got {len(rows)}; use hold(q) to rest at one point")
+    if len(rows) > _MAX_POINTS:
+        raise ControlError(f"points: at most {_MAX_POINTS} are allowed, got {len(rows)}; use rd.control.Samples")
     t = increasing("times_s", times_s, len(rows))
     ends = np.zeros((2, _DERIVATIVES[kind], rows.shape[1]))
     for end, name, v in zip(ends, ("v0", "v1"), (v0, v1), strict=True):
-        end[0] = _of_joints(name, v, joint_names, (), rows.shape[1:])
+        end[0] = _joint_numbers(name, v, joint_names, (), rows.shape[1:])
     return PiecewisePolynomial(*spline(t, rows, ends))
 
 
-def _of_joints(what: str, values: object, joint_names: Sequence[str] | None, *shapes: validate.Shape) -> np.ndarray:
+def _joint_numbers(
+    label: str, values: object, joint_names: Sequence[str] | None, *shapes: validate.Shape
+) -> np.ndarray:
     """Return finite numbers of one of the shapes, from an array or by joint name."""
-    return numbers(what, validate.in_order(what, values, joint_names, error=ControlError), *shapes)
+    return numbers(label, validate.in_order(label, values, joint_names, error=ControlError), *shapes)
 
 
 def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:

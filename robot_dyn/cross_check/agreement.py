@@ -1,4 +1,4 @@
-"""Agreements: difference of two values of one quantity relative to its scale, at the worst entry and state."""
+"""Agreement of two values of one quantity: their difference relative to its scale, at the worst entry and state."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Agreement:
         error: Difference relative to its scale.
         tolerance: Allowed error.
         entry: Joints or frame of the entry.
-        pinocchio, own: The two values. For numbers of the file: the value used by both implementations, and yourdfpy's.
+        pinocchio, own: The two values; for numbers of the file, the value both implementations use, and yourdfpy's.
         state: q, v, a, tau, by name; empty for numbers of the file.
     """
 
@@ -98,7 +98,7 @@ class Comparison(Answer):
         from robot_dyn.foundations.display import levels
 
         shares = {agreement.quantity: agreement.tolerance_fraction for agreement in self.agreements}
-        return levels("worst error / allowed; exact agreement is left out", shares, 1.0)
+        return levels("worst error / allowed; exact agreement is omitted", shares, 1.0)
 
 
 def _row(x: Agreement) -> tuple[str, ...]:

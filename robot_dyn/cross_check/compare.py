@@ -43,7 +43,7 @@ def compare(
     tolerance: float = TOLERANCE,
     on_sample: Callable[[], object] | None = None,
 ) -> Comparison:
-    """Cross-check a robot at random states within its joint limits, and the numbers of its file against yourdfpy's.
+    """Cross-check a robot at random states within its joint limits, and the numbers in its file against yourdfpy.
 
     Args:
         robot: Robot to check.
@@ -53,7 +53,7 @@ def compare(
         on_sample: Function called after each state, for example to show progress.
 
     Raises:
-        QueryError: If samples is not positive.
+        QueryError: If an argument has the wrong type, or `samples` or `tolerance` is not positive.
     """
     instance("robot", robot, Robot, "give a robot, for example rd.load('ur5')")
     samples, seed = integer("samples", samples, least=1, most=10**6), integer("seed", seed, most=2**128 - 1)
@@ -88,7 +88,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray
 def _pairs(
     robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], frames: tuple[str, ...], tolerance: float
 ) -> Iterator[Pair]:
-    """Return both values of every query except forward dynamics, and of two identities."""
+    """Yield both values of every query except forward dynamics, and of two identities."""
     q, v, a = (state[name] for name in ("q", "v", "a"))
     size, absolute = magnitudes(own.linkage, q), {name: np.abs(x) for name, x in state.items()}
     names = _TWIST | {"n": robot.joint_names, "p": parameter_names(robot.body_names)}
@@ -97,7 +97,7 @@ def _pairs(
         if quantity.solves:
             continue
         for frame, options in _frames(quantity, frames):
-            one, two = (quantity.ask(engine, state, *frame, **options) for engine in (robot, own))
+            one, two = (quantity.evaluate(engine, state, *frame, **options) for engine in (robot, own))
             scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute, *frame)
             values[quantity.name], where = (one, two), "".join((*frame, *(f" ({axes})" for axes in options.values())))
             labels = names | {3: ("by q", "by v", "by a")} if quantity.axes == (3, "n", "n") else names
@@ -110,14 +110,14 @@ def _pairs(
 
 
 def _frames(quantity: Quantity, frames: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
-    """Return the frames and options with which a query is compared."""
+    """Yield the frames and options with which a query is compared."""
     for frame in ((name,) for name in frames) if quantity.framed else ((),):
         for axes in Axes if quantity.directed else ("",):
             yield frame, {"expressed_in": axes} if axes else {}
 
 
 def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], tolerance: float) -> list[Pair]:
-    """Return forward dynamics by three algorithms and its inverse; nothing where M is not positive definite."""
+    """Return forward dynamics by up to three algorithms, and its inverse; nothing if M is not positive definite."""
     q, v, tau = (state[name] for name in ("q", "v", "tau"))
     size, pairs = magnitudes(own.linkage, q), []
     try:
@@ -147,7 +147,7 @@ def _notes(robot: Robot, unsolved: int, samples: int) -> tuple[str, ...]:
     notes = []
     if unsolved:
         notes.append(
-            f"forward dynamics is not compared at {unsolved} of {samples} states, where M is not positive definite"
+            f"forward dynamics not compared at {unsolved} of {samples} states, where M is not positive definite"
         )
     if robot.joint_without_inertia is not None:
         notes.append(f"no forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")

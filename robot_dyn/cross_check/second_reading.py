@@ -1,8 +1,8 @@
 """The second reading: a robot's file as read by yourdfpy, compared with the numbers of both implementations.
 
-Pinocchio and the library's own implementation both use the output of the checked reader, so an error of that reader
-affects both, and comparing M, C and N does not reveal it. yourdfpy reads the bytes of the file. The two readings share
-only the XML parser (libxml2) and `float`, not the code for elements, attributes, defaults or names.
+Pinocchio and the library's own implementation both use the output of the library's URDF reader, so comparing M, C and N
+does not reveal an error of that reader. yourdfpy reads the original bytes. The two readings share only the XML parser
+(libxml2) and `float`, not the code for elements, attributes, defaults or names.
 [URDF: wiki.ros.org/urdf/XML]
 """
 
@@ -34,20 +34,20 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
     """Return the numbers of a description paired with yourdfpy's, and a note if yourdfpy cannot read the file."""
     try:
         robot = _by_yourdfpy(description.text)
-        stated, elements = dict(_stated(robot)), set(_elements_stated(robot))
+        read, elements = dict(_numbers_by_yourdfpy(robot)), set(_elements_by_yourdfpy(robot))
     except Exception as error:  # yourdfpy can raise anything
         message = getattr(
             error, "msg", f"{type(error).__name__}: {error}"
         )  # the message of a syntax error, without its position
         why = shorten(" ".join(str(message).split()), 200)
         return [], (f"no second reading of the file: yourdfpy cannot read it ({why})",)
-    taken, names = dict(_taken(description)), set(_elements_taken(description))
+    used, names = dict(_numbers_of_description(description)), set(_elements_of_description(description))
     pairs = [
         Pair("file: links and joints", float(name in names), float(name in elements), 1.0, tolerance, frame=name)
         for name in sorted(names | elements)
     ]
-    for key in sorted(taken.keys() | stated.keys()):
-        one, two = (side.get(key, np.array(np.nan)) for side in (taken, stated))
+    for key in sorted(used.keys() | read.keys()):
+        one, two = (side.get(key, np.array(np.nan)) for side in (used, read))
         scale = np.ones((4, 4)) if key[0] == "file: origin" else np.maximum(np.abs(one), np.abs(two))
         pairs.append(Pair(key[0], one, two, scale, tolerance, frame=key[1]))
     return pairs, ()
@@ -57,14 +57,14 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
 def _by_yourdfpy(text: bytes) -> Any:
     from yourdfpy import URDF  # heavy: imports trimesh
 
-    root = etree.fromstring(text)  # raises where yourdfpy would use the recovered part
+    root = etree.fromstring(text)  # raises on errors from which yourdfpy would recover
     if None in root.nsmap:
-        raise ValueError("it does not read elements of a default namespace")
+        raise ValueError("it does not support a default namespace")
     return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot
 
 
-def _elements_stated(robot: Any) -> Iterator[str]:
-    """Links, including a root named only by joints, and joints with their kind and links, as read by yourdfpy."""
+def _elements_by_yourdfpy(robot: Any) -> Iterator[str]:
+    """Yield links, including a root that only joints mention, and joints with type and links, as read by yourdfpy."""
     names = {link.name for link in _connected(robot)} | {joint.parent for joint in robot.joints}
     yield from (f"link {name.strip()!r}" for name in names)
     for joint in robot.joints:
@@ -72,10 +72,10 @@ def _elements_stated(robot: Any) -> Iterator[str]:
         yield _joint(joint.name.strip(), joint.type, joint.parent.strip(), joint.child.strip(), source)
 
 
-def _elements_taken(description: Description) -> Iterator[str]:
-    taken = tree_of(description, Edits())
-    yield from (f"link {link.name!r}" for link in taken.links)
-    for joint in taken.joints:
+def _elements_of_description(description: Description) -> Iterator[str]:
+    used = tree_of(description, Edits())
+    yield from (f"link {link.name!r}" for link in used.links)
+    for joint in used.joints:
         yield _joint(joint.name, joint.kind, joint.parent, joint.child, joint.mimic and joint.mimic.source)
 
 
@@ -84,8 +84,8 @@ def _joint(name: str, kind: str, parent: str, child: str, source: str | None) ->
     return f"joint {name!r}: {kind}, {parent!r} → {child!r}{follows}"
 
 
-def _stated(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """The numbers of the file as read by yourdfpy, or the format's defaults where the file states none."""
+def _numbers_by_yourdfpy(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
+    """Yield the numbers of the file as read by yourdfpy, or the format's defaults if the file states none."""
     for link in _connected(robot):
         where, inertial = f"link {link.name.strip()!r}", link.inertial
         if inertial is not None:
@@ -117,7 +117,7 @@ def _or_identity(origin: np.ndarray | None) -> np.ndarray:
 
 
 def _limits(joint: Any) -> np.ndarray:
-    """Return lower, upper, effort and velocity limits; docs/reference/findings.md lists limits that are ignored."""
+    """Return lower, upper, effort and velocity limits; docs/reference/findings.md lists ignored limits."""
     lower, upper, *rates = (
         joint.limit and getattr(joint.limit, key) for key in ("lower", "upper", "effort", "velocity")
     )
@@ -126,17 +126,17 @@ def _limits(joint: Any) -> np.ndarray:
     return np.array([lower or 0, upper or 0, *(_NONE if x is None or x < 0 else x for x in rates)])
 
 
-def _taken(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """Return the same numbers from the description, as both implementations use them."""
-    taken = tree_of(description, Edits())
-    for link in taken.links:
+def _numbers_of_description(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
+    """Yield the same numbers from the description, as both implementations use them."""
+    used = tree_of(description, Edits())
+    for link in used.links:
         where = f"link {link.name!r}"
         for part in link.inertials:
             yield ("file: origin", where), _placement(part.xyz, part.rpy)
             yield ("file: mass", where), FLOAT64.array(part.mass)
             yield ("file: inertia", where), FLOAT64.array(part.moments)
     elements = {joint.get("name"): joint for joint in description.element.iterfind("joint")}
-    for joint in taken.joints:
+    for joint in used.joints:
         where, element = f"joint {joint.name!r}", elements[joint.name]
         yield ("file: origin", where), _placement(joint.xyz, joint.rpy)
         if joint.kind == "fixed":

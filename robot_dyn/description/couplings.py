@@ -11,10 +11,10 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, Numeral
 from robot_dyn.foundations.errors import OverflowedError
-from robot_dyn.foundations.validate import LEAST_EXACT, is_moderate
+from robot_dyn.foundations.validate import MAX_ROUNDING_ERROR, is_moderate
 from robot_dyn.foundations.values import Value
 
-_EXACT = LEAST_EXACT / np.finfo(np.float64).eps  # float64 positions below this are exact to LEAST_EXACT
+_EXACT = MAX_ROUNDING_ERROR / np.finfo(np.float64).eps  # float64 positions below this are exact to MAX_ROUNDING_ERROR
 
 
 @final
@@ -90,7 +90,7 @@ class Couplings(Value):
         if self._rounded.size and full.dtype.kind == "f" and self._hidden(full):
             raise OverflowedError(
                 "q is so large that the positions of mimic joints are not exact to"
-                f" {LEAST_EXACT:g} rad or m; use a smaller q, or rd.Lagrangian(robot, rd.accuracy.Ball(bits))"
+                f" {MAX_ROUNDING_ERROR:g} rad or m; use a smaller q, or rd.Lagrangian(robot, rd.accuracy.Ball(bits))"
             )
         return full
 
@@ -100,11 +100,11 @@ class Couplings(Value):
         return np.flatnonzero(np.any((self.S != 0) & (np.abs(self.S) != 1), axis=1) | (self.s0 != 0))
 
     def _hidden(self, full: Array) -> bool:
-        """Return True if rounding of a coupled joint's position exceeds LEAST_EXACT."""
+        """Return True if rounding of a coupled joint's position exceeds MAX_ROUNDING_ERROR."""
         if full.ndim == 1 and full.dtype == np.float64 and is_moderate(full, _EXACT):
             return False
         position = full[..., self._rounded]
-        return bool(np.finfo(position.dtype).eps * np.abs(position).max(initial=0.0) > LEAST_EXACT)
+        return bool(np.finfo(position.dtype).eps * np.abs(position).max(initial=0.0) > MAX_ROUNDING_ERROR)
 
     def velocity(self, v: Array) -> Array:
         """Return v_full = S v; accelerations transform in the same way, because S is constant."""

@@ -19,7 +19,7 @@ from robot_dyn.foundations.coefficients import (
     with_values,
 )
 from robot_dyn.foundations.errors import EffectError
-from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.foundations.saturation import initial_middle, limit_thresholds, piece, saturated
 from robot_dyn.foundations.threshold import Threshold, smooth
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -53,10 +53,10 @@ class EffortLimit(Bound):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "_middle", middle_of(self.limit))
+        object.__setattr__(self, "_middle", initial_middle(self.limit))
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        return limits_reached(self.limit, self._middle, n)
+        return limit_thresholds(self.limit, self._middle, n)
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> EffortLimit:
         limit, middle = piece(self.limit, n, sides)
@@ -114,7 +114,7 @@ def stated_efforts(dynamics: Dynamics) -> np.ndarray:
         listed = ", ".join(map(repr, names[:6])) + (", …" if len(names) > 6 else "")
         raise EffectError(
             f"the file states an effort limit of 0 for {listed}, so no controller could move these joints; give limits"
-            f" by joint, such as {{{names[0]!r}: 87.0}}, or {{{names[0]!r}: 0}} for a passive joint; joints left out"
-            " have none"
+            f" by joint, for example {{{names[0]!r}: 87.0}}, or {{{names[0]!r}: 0}} for a passive joint; omitted joints"
+            " have no limit"
         )
     return robot.effort_limit

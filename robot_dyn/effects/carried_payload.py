@@ -34,8 +34,8 @@ _END = coefficient("s", shapes=((),), infinite=True, can_vary=False)
 class CarriedPayload(Timed):
     """A payload carried for start_s ≤ t < end_s; from the start of a run if start_s ≤ 0.
 
-    In the energy ledger its work is the energy that the body brings minus the energy that it takes away. The kinetic
-    energy lost when a body at rest is picked up is the work of `pick_up`.
+    In the energy ledger its work is the energy that the body brings minus the energy it takes away. The kinetic energy
+    lost when a body at rest is picked up is the work of `pick_up`.
 
     Attributes:
         payload: The body and its link.
@@ -57,7 +57,8 @@ class CarriedPayload(Timed):
     term = "a rigid body on a link, in M, C and N while it is carried"
 
     def __post_init__(self) -> None:
-        instance("payload", self.payload, Payload, "give one, such as rd.Payload('tool0', 1.5)", error=EffectError)
+        remedy = "give a payload, for example rd.Payload('tool0', 1.5)"
+        instance("payload", self.payload, Payload, remedy, error=EffectError)
         truth("at_rest", self.at_rest, error=EffectError)
         super().__post_init__()
 
@@ -75,7 +76,7 @@ def robot_with(dynamics: Dynamics, effects: Sequence[CarriedPayload], carried: S
     """
     with_ = getattr(dynamics, "with_", None)
     if with_ is None:
-        raise EffectError(f"carried_payload: needs a Robot, got {type(dynamics).__name__}; give rd.Plant(robot, …)")
+        raise EffectError(f"carried_payload needs a Robot, got {type(dynamics).__name__}; use rd.Plant(robot, …)")
     massless = ((0.0, 0.0, 0.0),) * 3
     bodies = [
         effect.payload if is_carried else replace(effect.payload, mass=0.0, inertia=massless)

@@ -1,7 +1,7 @@
 """Joint torques along a motion, split by cause: τ = M(q) a + C(q, v) v + ∂V/∂q − Σ τ_effect, one row for each time.
 
 Causes are "inertia", "Coriolis", "gravity" and each effect by name. Their sign is that of the actuation: the torque
-with which the drive balances the cause. A payload that comes and goes is one cause, with its inertia and its weight.
+with which the drive balances the cause. A carried payload is one cause, with its inertia and weight.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 OF_BODIES = "inertia", "Coriolis", "gravity"
-_ROUNDING = 1e-12  # relative to the terms; a torque at its bound may exceed it by this much
+_ROUNDING = 1e-12  # relative to the terms, by which a torque may exceed its bound
 
 
 @final
@@ -90,8 +90,7 @@ def torques_by_cause(plant: Plant | Dynamics, t: ArrayLike, q: ArrayLike, v: Arr
     for effect in plant.forces:
         if isinstance(effect, Stateful):
             raise EffectError(
-                f"causes: {effect.name} has states, which a motion does not determine; simulate the motion and call"
-                " run.causes()"
+                f"causes: a motion does not determine the states of {effect.name}; simulate it and call run.causes()"
             )
     exerted = exerted_torques(plant, t, q, v, a)
     tau = plant.dynamics.inverse_dynamics(q, v, a) - sum(exerted.values(), start=np.zeros_like(q))
@@ -114,7 +113,7 @@ def by_cause(
         exerted: Torque of each effect on the joints, (k, n), by name; see `exerted_torques`.
     """
     N = dynamics.nan_rows.N(q)
-    # M a comes from the recursion, not from the matrix: O(n) time, and no n × n matrices to store
+    # M a from the recursion, not from the matrix: O(n) time, and no n × n matrices to store
     of_bodies = (dynamics.nan_rows.inverse_dynamics(q, 0 * v, a) - N, dynamics.nan_rows.coriolis_torque(q, v))
     torques = dict(zip(OF_BODIES, (*of_bodies, N), strict=True)) | {name: 0.0 - x for name, x in exerted.items()}
     kinds = joint_types_of(dynamics)
@@ -127,12 +126,12 @@ def exerted_torques(
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Compute the torque of each effect on the joints, (k, n), by name: M a + C v + ∂V/∂q = τ + Σ exerted.
 
-    If the actuation of a run is passed, effects that hold joints balance the remainder of the equation on joints of
-    velocity 0, within their bounds, dry friction before stops. Drives subtract the actuation of their motors from
-    their joints. Rows at which an effect raises an error, such as the end of a run, are NaN.
+    If the actuation of a run is passed, effects that hold joints balance the remainder of the equation at joints of
+    velocity 0, within their bounds, dry friction before stops; and the torque of a drive includes minus the actuation
+    that its motors receive. Rows at which an effect raises an error, for example at the end of a run, are NaN.
 
     Args:
-        plant: Bodies and effects; its payloads may come and go.
+        plant: Bodies and effects; payloads may be picked up and dropped.
         t: Times, (k,).
         q: Positions, (k, n).
         v: Velocities, (k, n).
@@ -191,7 +190,9 @@ def _complete(
             joints = list(force.driven(plant.dynamics.n))
             # the contact of a rigid backlash is not among its states
             has_contact = isinstance(force, SetValued)
-            exerted[name][:, joints] += remainder()[:, joints] if has_contact else force.reaching(tau) - tau[:, joints]
+            exerted[name][:, joints] += (
+                remainder()[:, joints] if has_contact else force.direct_actuation(tau) - tau[:, joints]
+            )
     slack = _ROUNDING * (np.abs(needed) + np.abs(tau))
     holding = sorted((x for x in forces.items() if isinstance(x[1], SetValued)), key=lambda x: x[1].stops)
     for name, force in holding:

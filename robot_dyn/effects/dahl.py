@@ -20,7 +20,7 @@ from robot_dyn.foundations.coefficients import CoefficientField, OptionalCoeffic
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
-_SLOW = 1e-6  # relative to the deflection f_c/σ, per second: reversals of slower motion change no digit
+_SLOW = 1e-6  # relative to the deflection f_c/σ, per second: reversals of slower motion have no effect on the result
 
 
 @final
@@ -29,7 +29,7 @@ class DahlFriction(Bristles, Dissipative):
     """Dry friction with a state for each joint, the deflection z of bristles: τ = −σ z.
 
     z' = |w|^α sign(w) v with w = 1 − (σ z/f_c) sign(v). The bristles store ½ σ z² and return part of it: the
-    effect is passive. Static and sliding friction are equal, f_c, which is approached over a path of about f_c/σ. The
+    effect is passive. Static and sliding friction both equal f_c, which is approached over a path of about f_c/σ. The
     rate has a kink at v = 0, where steps end.
 
     Attributes:

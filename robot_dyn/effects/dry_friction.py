@@ -27,9 +27,9 @@ from robot_dyn.queries.dynamics import Dynamics
 class DryFriction(SetValued):
     """Coulomb friction: τ = −f sign(v) if v ≠ 0; if v = 0, the torque |τ| ≤ f_s that keeps the joint at rest.
 
-    A joint at rest stays exactly there for as long as the load does not exceed f_s. Then it slides, with f = f_c, or
-    by Stribeck's curve, f = f_c + (f_s − f_c) exp(−(v/v_s)²), if v_s is given. If f_s > f_c, both rest and sliding
-    solve the equations for some loads: a joint at rest then stays at rest.
+    A joint at rest stays exactly there while the load does not exceed f_s. Then it slides, with f = f_c or, if v_s is
+    given, by Stribeck's curve f = f_c + (f_s − f_c) exp(−(v/v_s)²). If f_s > f_c, both rest and sliding solve the
+    equations for some loads: a joint at rest then stays at rest.
     [Armstrong-Hélouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the
     control of machines with friction, 1994]
 
@@ -40,7 +40,7 @@ class DryFriction(SetValued):
         coulomb: f_c, sliding friction, a scalar or (n,), in [N m] or [N], not negative.
         static: f_s, static friction, not less than f_c; f_c by default.
         stribeck_velocity: v_s, a scalar or (n,), in [rad/s] or [m/s], positive; without it friction drops
-            from f_s to f_c where sliding starts.
+            from f_s to f_c when sliding starts.
 
     Example:
         >>> rd.effects.DryFriction(coulomb=[0.4, 0.2], static=0.6, stribeck_velocity=0.1)
@@ -61,7 +61,7 @@ class DryFriction(SetValued):
         default=default(None), init=False, repr=False, metadata=coefficient(can_vary=False)
     )
 
-    rubs = True
+    has_friction = True
     term = "−f(v) sign(v); |τ| ≤ f_s at v = 0"
 
     def __post_init__(self) -> None:

@@ -36,7 +36,7 @@ class _ClassName:
 
 
 class Effect(Value):
-    """Anything that acts on the joints: a `Force`, a `Bound`, or a combination of these, its `parts`.
+    """A `Force` on the joints, a `Bound` on the actuation, or a combination of these, its `parts`.
 
     Subclass `Conservative`, `Dissipative`, `Active` or `Bound`; an effect with states also derives from `Stateful` or
     `Drive`. Methods are pure functions, called with
@@ -89,10 +89,10 @@ class Effect(Value):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         """Thresholds between smooth formulas, on an arm with n joints; () if the effect is smooth everywhere.
 
-        Integration steps end where a threshold is passed; `on_side` returns the effect on either side. A class that
-        does not define this method makes no claim: it runs interpreted unless machine code is requested, and error
-        estimates do not rely on the order of the method. Thresholds on the actuation are for bounds and apply to
-        the actuation that reaches the bound.
+        Integration steps end where a threshold is passed; `on_side` returns the effect on either side. If a class does
+        not define this method, its smoothness is unknown: it runs interpreted unless machine code is requested, and
+        error estimates do not rely on the order of the method. Thresholds on the actuation are for bounds and apply to
+        the actuation that enters the bound.
         """
         return ()
 
@@ -116,7 +116,7 @@ class Effect(Value):
         the layers are those around v = 0 with the widths of `widths`. Override this method for layers of positions or
         states, or around other velocities.
         """
-        width = np.maximum(np.broadcast_to(self.widths[1], n), np.finfo(float).tiny)  # 0 is a kink: any step crosses it
+        width = np.maximum(np.broadcast_to(self.widths[1], n), np.finfo(float).tiny)  # 0, a kink: any step crosses it
         return tuple(Layer(i, float(width[i]), of_velocity=True) for i in range(n) if width[i] < inf)
 
 
@@ -209,7 +209,7 @@ class Stateful(Effect, ABC):
 
 
 class Drive(Stateful, Force, ABC):
-    """A stateful force with motors, which receive the actuation of some joints instead of the joints themselves.
+    """A stateful force whose motors receive the actuation of some joints, instead of the joints themselves.
 
     The ledger counts the work of its torque on the joints minus the work of the actuation on its motors.
     """
@@ -225,7 +225,7 @@ class Drive(Stateful, Force, ABC):
     def speeds(self, z: Array) -> Array:
         """Return the velocities at which the actuation of the driven joints does work, in the order of `driven`."""
 
-    def reaching(self, u: Array) -> Array:
+    def direct_actuation(self, u: Array) -> Array:
         """Return the part of the actuation u, (..., n), that acts on the driven joints; 0 by default."""
         return 0 * u[..., list(self.driven(u.shape[-1]))]
 

@@ -48,7 +48,7 @@ class EquationOfMotion:
 
     @cached_property
     def payloads(self) -> tuple[CarriedPayload, ...]:
-        """The payloads that come and go."""
+        """The payloads that are picked up and dropped."""
         return tuple(effect for effect in self.effects if isinstance(effect, CarriedPayload))
 
     @cached_property
@@ -68,7 +68,7 @@ class EquationOfMotion:
 
     @cached_property
     def drives(self) -> Mapping[int, Drive]:
-        """The effects that take the actuation of joints, by index."""
+        """The effects whose motors receive the actuation of joints, by index."""
         drives = {k: effect for k, effect in enumerate(self.effects) if isinstance(effect, Drive)}
         joints = [i for drive in drives.values() for i in drive.driven(self.dynamics.n)]
         for i in joints:
@@ -83,12 +83,12 @@ class EquationOfMotion:
         return drives
 
     def on_joints(self, u: Array) -> Array:
-        """Return the part of the actuation u, (..., n), that acts on joints: 0 where it acts on a drive's motor."""
+        """Return the part of the actuation u, (..., n), that acts on joints directly, not on the motor of a drive."""
         if not self.drives:
             return u
         on_joints = u.copy()
         for drive in self.drives.values():
-            on_joints[..., list(drive.driven(self.dynamics.n))] = drive.reaching(u)
+            on_joints[..., list(drive.driven(self.dynamics.n))] = drive.direct_actuation(u)
         return on_joints
 
     def torques(
@@ -141,24 +141,24 @@ class EquationOfMotion:
         return u
 
     @cached_property
-    def _lags(self) -> int:
-        """Index of the first bound with states or of the velocity: only bounds before it act before sampling."""
+    def _first_continuous(self) -> int:
+        """Index of the first bound with states or of the velocity; bounds before it act only at ticks."""
         bounds = ((k, effect) for k, effect in enumerate(self.effects) if isinstance(effect, Bound))
         return next((k for k, bound in bounds if k in self.states or bound.of_velocity), len(self.effects))
 
     def commanded(self, u: Array) -> Array:
         """Return the actuation after the bounds before the first one with states or of the velocity."""
-        return self.applied(u, u, u, range(self._lags))[0]
+        return self.applied(u, u, u, range(self._first_continuous))[0]
 
     @cached_property
     def bounds_at_all_times(self) -> range:
         """Indices of the effects whose bounds also act between ticks: those after the bounds of `commanded`."""
-        return range(self._lags, len(self.effects))
+        return range(self._first_continuous, len(self.effects))
 
-    def applied(self, u: Array, v: Array, z: Array, of: range | None = None) -> tuple[Array, Mapping[int, Array]]:
-        """Return the actuation after the remaining bounds, at v and states z, and that which enters each bound."""
+    def applied(self, u: Array, v: Array, z: Array, indices: range | None = None) -> tuple[Array, Mapping[int, Array]]:
+        """Return the actuation after the remaining bounds, at v and states z, and the input of each bound by index."""
         reached = {}
-        for k in self.bounds_at_all_times if of is None else of:
+        for k in self.bounds_at_all_times if indices is None else indices:
             effect = self.effects[k]
             if isinstance(effect, Bound):
                 reached[k] = u

@@ -10,19 +10,19 @@ from robot_dyn.description.catalog import abbreviated
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect, Force
 from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.model.findings import reservations
+from robot_dyn.model.findings import reading_findings
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_texts, joint_types_of
 
 EDITED = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
-    "lock": "a joint held at a value, its link part of the link before",
+    "lock": "a joint fixed at a value, which makes its link part of the parent link",
     "payload": "a rigid body on a link, in M, C and N",
     "armature": "added to the diagonal of M",
-    "mass_scale": "factor on mass and inertia of all links, payloads excepted",
-    "mass_scales": "factors on mass and inertia of single links, payloads excepted",
-    "mass": "of a link, replaces the value in the file",
-    "inertia": "of a link, replaces the value in the file",
+    "mass_scale": "factor on mass and inertia of all links, except payloads",
+    "mass_scales": "factors on mass and inertia of single links, except payloads",
+    "mass": "replaces the mass of a link in the file",
+    "inertia": "replaces the inertia of a link in the file",
 }
 """Description of each edit of a robot, in one line."""
 
@@ -52,7 +52,7 @@ class Term:
         kind: Name in scenes.
         term: Equation in one line; empty for a user-defined effect without `term`.
         numbers: Numbers as written in a scene.
-        coefficients: Coefficients as they act, with units.
+        coefficients: Resolved coefficients, with units.
     """
 
     kind: str
@@ -77,7 +77,7 @@ class Explanation(Answer):
         method: Lines on method and start.
         machine_code: Lines on instructions.
         source: Path of the robot's file; empty if there is none.
-        findings: Estimated values of the robot, and assumptions and omissions when its file was read.
+        findings: Estimated values of the robot, and assumptions and omissions made while reading its file.
     """
 
     robot: str
@@ -103,10 +103,10 @@ class Explanation(Answer):
             yield f"  {effect.kind}: {effect.term}" if effect.term else f"  {effect.kind}"
             yield from (f"    {x.key} = {x.value}  ({x.source})" for x in effect.numbers)
             if effect.coefficients:
-                yield f"    as it acts: {'; '.join(effect.coefficients)}"
+                yield f"    resolved: {'; '.join(effect.coefficients)}"
         if self.absent:
             yield ""
-            yield "not simulated (the setup does not name them):"
+            yield "not simulated (not part of the setup):"
             yield f"  {', '.join(self.absent)}"
         if self.absent_of_control:
             yield f"  of the control: {', '.join(self.absent_of_control)}"
@@ -119,7 +119,7 @@ class Explanation(Answer):
 
 
 def explanation(dynamics: Dynamics, effects: tuple[Effect, ...]) -> Explanation:
-    """Return the equation of motion of dynamics with effects."""
+    """Return the equation of motion of rigid bodies with effects."""
     robot: Any = getattr(dynamics, "robot", dynamics)
     edits = tuple(edit_terms(robot.edits)) if hasattr(robot, "edits") else ()
     weight = ["∂V/∂q"] if not hasattr(robot, "edits") or any(robot.edits.gravity) else []
@@ -133,9 +133,12 @@ def explanation(dynamics: Dynamics, effects: tuple[Effect, ...]) -> Explanation:
             f"N = {_sum([*weight, *(f'− τ_{name}' for name in forces)])}",
             " after ".join(["τ = u", *([", ".join(bounds)] if bounds else [])]),
         ),
-        (*edits, *(Term(x[0].name, term_of(x), coefficients=as_they_act(x, dynamics)) for x in _by_effect(effects))),
+        (
+            *edits,
+            *(Term(x[0].name, term_of(x), coefficients=acting_coefficients(x, dynamics)) for x in _by_effect(effects)),
+        ),
         source=robot.description.source if hasattr(robot, "description") else "",
-        findings=reservations(robot.description) if hasattr(robot, "description") else (),
+        findings=reading_findings(robot.description) if hasattr(robot, "description") else (),
     )
 
 
@@ -145,7 +148,7 @@ def _sum(terms: list[str]) -> str:
 
 
 def _by_effect(effects: Iterable[Effect]) -> Iterator[list[Effect]]:
-    """Yield the parts of each effect: neighbours of one name and different classes."""
+    """Yield the parts of each effect: consecutive ones with the same name and different classes."""
     parts: list[Effect] = []
     for effect in effects:
         if parts and (effect.name != parts[0].name or type(effect) in map(type, parts)):
@@ -162,7 +165,7 @@ def term_of(parts: Iterable[Effect | type[Effect]]) -> str:
     return " ".join((first, *(f"− {term[1:]}" if term[:1] == "−" else f"+ {term}" for term in rest)))
 
 
-def as_they_act(parts: Iterable[object], dynamics: Dynamics, signal: str = "signal") -> tuple[str, ...]:
+def acting_coefficients(parts: Iterable[object], dynamics: Dynamics, signal: str = "signal") -> tuple[str, ...]:
     """Return the coefficients of the parts of an effect or a controller, with units; see `coefficient_texts`."""
     types = joint_types_of(dynamics)
     texts = {name: text for part in parts for name, text in coefficient_texts(part, types, signal).items()}

@@ -57,7 +57,7 @@ class _JointStops(Effect):
 
     @property
     def widths(self) -> tuple[Scalar, Scalar]:
-        with np.errstate(divide="ignore"):  # depth at 1 N m or 1 N: relevant loads lie deeper
+        with np.errstate(divide="ignore"):  # depth at 1 N m or 1 N: relevant loads are larger
             return np.divide(1.0, getattr(self, self.through)), inf
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
@@ -115,14 +115,14 @@ class JointStopDamper(_JointStops, Dissipative):
     Attributes:
         lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m].
         upper: Position of the upper stop, inf for none, above the lower one.
-        damping: c, damping for each unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
+        damping: c, damping per unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
 
     Example:
         >>> rd.effects.JointStopDamper(lower=[-1.0, -2.0], upper=1.0, damping=20.0)
     """
 
     damping: CoefficientField = field(
-        metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", minimum=0)
+        metadata=coefficient("N m s/rad²", symbol="c, damping per unit of depth", minimum=0)
     )
 
     through = "damping"

@@ -45,7 +45,7 @@ class _Line(Effect):
             instance(name, frame, str, "give the name of a frame", error=EffectError)
         if self.frame == self.other_frame:
             raise EffectError(
-                f"both points are fixed to {self.frame!r}, so their distance is constant: name another frame"
+                f"both points are fixed to {self.frame!r}, so their distance is constant; give another frame"
             )
         super().__post_init__()
 
@@ -66,7 +66,7 @@ class _Line(Effect):
         if square.dtype != object and not square.all():
             other = "the world" if self.other_frame is None else repr(self.other_frame)
             raise EffectError(
-                f"{self.name}: the points of {self.frame!r} and {other} coincide, so their line has no direction"
+                f"{self.name}: the points on {self.frame!r} and {other} coincide, so the line has no direction"
             )
         return line, sqrt(square)
 

@@ -20,7 +20,7 @@ from robot_dyn.foundations.coefficients import CoefficientField, coefficient
 from robot_dyn.foundations.threshold import Layer, Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
-_SLOW = 1e-6  # relative to v_s: reversals of slower motion change no digit
+_SLOW = 1e-6  # relative to v_s: reversals of slower motion have no effect on the result
 _REVERSAL = "velocity", "turns positive", "turns negative"
 
 
@@ -43,7 +43,7 @@ class Bristles(Stateful):
         return tuple(Layer(i, float(sliding[i] / stiffness[i]), level=None, state=i) for i in joints)
 
     def reversals(self, slack: Scalar, n: int) -> tuple[Threshold, ...]:
-        """Return the thresholds at which a joint with bristles reverses, for speeds above the slack, (n,)."""
+        """Return the thresholds at which joints with bristles reverse, for speeds above the slack, (n,)."""
         acts, slow = np.broadcast_to(self.bristle_stiffness, n) > 0, np.broadcast_to(slack, n)
         return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])
 

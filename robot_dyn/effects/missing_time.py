@@ -1,4 +1,4 @@
-"""A stand-in for the time of a query without t: an effect that uses it raises an error with its name."""
+"""A placeholder for the time in a query without t: an effect that uses it raises an error with its name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robot_dyn.foundations.errors import MissingTimeError
 
 @final
 class _MissingTime:
-    """A number whose operations all raise a MissingTimeError; it may be passed on."""
+    """A placeholder for a number: every operation raises a MissingTimeError, but it may be passed as an argument."""
 
     __hash__ = object.__hash__
 

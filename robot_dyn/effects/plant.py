@@ -21,7 +21,7 @@ from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import EffectError, MissingTimeError, OverflowedError, QueryError, shown
-from robot_dyn.foundations.names_nearest import NamesNearest
+from robot_dyn.foundations.suggestions import SuggestsNames
 from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
 from robot_dyn.foundations.values import Caching, several
 from robot_dyn.queries.dynamics import Dynamics, NanRows
@@ -29,7 +29,7 @@ from robot_dyn.queries.dynamics import Dynamics, NanRows
 
 @final
 @dataclass(frozen=True)
-class Plant(NamesNearest, Caching):
+class Plant(SuggestsNames, Caching):
     """A `Dynamics` and the effects that act on it.
 
     Attributes:
@@ -87,14 +87,14 @@ class Plant(NamesNearest, Caching):
 
     @cached_property
     def _timed_payloads(self) -> tuple[CarriedPayload, ...]:
-        """The payloads that come and go; within a phase of a run, payloads are fixed as carried or not."""
+        """The payloads that are picked up and dropped; within a phase of a run, each is fixed as carried or not."""
         return tuple(x for x in self.effects if isinstance(x, CarriedPayload) and x.carried is None)
 
     def at(self, t: float | None) -> Plant:
         """Return the plant with the payloads carried at time t, in [s], as fixed bodies; itself without payloads.
 
         Raises:
-            QueryError: If t is not a finite number; MissingTimeError if it is None and a payload comes or goes.
+            QueryError: If t is not a finite number; MissingTimeError if it is None and there are such payloads.
         """
         payloads, time = self._timed_payloads, None if t is None else number("t", t)
         if not payloads:
@@ -214,7 +214,7 @@ class Plant(NamesNearest, Caching):
 
     def _finite(self, result: Array) -> Array:
         if not self._arithmetic.finite(result).all():
-            raise OverflowedError("the arguments are so large that the result overflows")
+            raise OverflowedError("the result overflows: the arguments are too large")
         return result
 
 
@@ -236,7 +236,7 @@ def stated_friction(dynamics: Dynamics) -> tuple[Effect, ...]:
     """Return the friction in the file of a robot.
 
     Raises:
-        EffectError: If the dynamics does not come from a file.
+        EffectError: If the dynamics are not those of a robot file.
     """
     try:
         robot: Any = dynamics

@@ -40,8 +40,8 @@ class PlantState(Answer, ReadOnly):
         N: Gravity minus the torques of effects, (n,), in [N m] or [N].
         effects: Torque of each effect on the joints, (n,), by name.
         held_joints: The joints that dry friction and rigid stops hold; () if tau follows from a.
-        plant: The plant, with the payloads it carries at that time.
-        of_tau: True if a follows from tau, False if tau follows from a.
+        plant: The plant, with the payloads carried at that time.
+        is_forward: True if a follows from tau, False if tau follows from a.
     """
 
     robot: str
@@ -60,7 +60,7 @@ class PlantState(Answer, ReadOnly):
     effects: dict[str, np.ndarray]
     held_joints: tuple[HeldJoint, ...]
     plant: Plant = field(metadata=UNREPORTED)
-    of_tau: bool = field(metadata=UNREPORTED)
+    is_forward: bool = field(metadata=UNREPORTED)
 
     @property
     def title(self) -> str:
@@ -115,11 +115,11 @@ def plant_state(
     plant, t = plant.at(t), None if t is None else number("t", t)
     robot = instance("plant", plant.dynamics, Robot, "give the plant of a robot, such as rd.Plant(rd.load('ur5'))")
     if (a is None) == (tau is None):
-        raise QueryError("give one of a and tau: the other follows from it")
+        raise QueryError("give either a or tau: the other follows from it")
     q, v = (one_state(name, x, robot.joint_names) for name, x in (("q", q), ("v", v)))
     held_joints: tuple[HeldJoint, ...] = ()
-    of_tau = tau is not None
-    if of_tau:
+    is_forward = tau is not None
+    if is_forward:
         tau = plant.actuation(one_state("tau", tau, robot.joint_names), v)
         a, held_joints = plant.forward_dynamics(q, v, tau, t=t), plant.held_joints(q, v, tau, t=t)
     else:
@@ -136,5 +136,5 @@ def plant_state(
     )
     return PlantState(
         robot.name, robot.edits.gravity, robot.gravity_acts, remarks, robot.joint_names, robot.joint_types,
-        **state, **terms, effects=effects, held_joints=held_joints, plant=plant, of_tau=of_tau,
+        **state, **terms, effects=effects, held_joints=held_joints, plant=plant, is_forward=is_forward,
     )  # fmt: skip

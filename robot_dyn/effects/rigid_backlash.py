@@ -36,8 +36,8 @@ class RigidBacklash(GearedMotor, SetValued):
     joint is the motor torque at the output of the gear, n times the torque of the rotor. Steps end when an end of the
     gap is reached or left. The states are δ of all driven joints, then δ̇, θ̇, and the contact impulse of the last step.
 
-    In the energy ledger the control does its work on the motors, which store ½ n² J θ̇². The motion of the rotors with
-    the arm is neglected.
+    In the energy ledger, control works on the motors, which store ½ n² J θ̇². Rotation of the rotors with the arm is
+    neglected.
 
     Attributes:
         half_gap: β, half of the play, a scalar or (n,), in [rad] or [m], not negative; a data sheet usually states the
@@ -103,7 +103,7 @@ class RigidBacklash(GearedMotor, SetValued):
         """Return 1 for driven joints whose motor rests at an end of the gap, else 0, (k,)."""
         return np.zeros(len(self._driven)) if self._contact is None else self.per_joint("_contact", n) ** 2
 
-    def reaching(self, u: Array) -> Array:
+    def direct_actuation(self, u: Array) -> Array:
         return self._touching(u.shape[-1]) * u[..., self._driven]
 
     def added_inertia(self, n: int) -> Array:

@@ -1,4 +1,4 @@
-"""Rigid joint stops: a joint never passes them; it bounces with a restitution, or comes to rest and is held."""
+"""Rigid joint stops: a joint never passes them; it bounces with a restitution, or comes to rest there."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from robot_dyn.foundations.coefficients import (
 )
 from robot_dyn.queries.dynamics import Dynamics
 
-_NEAR = 4e-15  # relative to a stop, or absolute in its unit: the precision to which events are located
+_NEAR = 4e-15  # precision of located events, relative to the stop if that exceeds 1 in its unit, otherwise absolute
 
 
 @final
@@ -69,7 +69,7 @@ class RigidStops(SetValued):
         return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
-        # Newton's law for joints that approach; a joint that leaves is reversed at most, so that r (v + v⁺) / 2 is 0
+        # Newton's law for joints that approach; a joint that leaves is at most reversed, so that r (v + v⁺) / 2 is 0
         back = -self.restitution * v
         lower = np.where(q <= self.lower + 0 * q, np.minimum(back, -v), 0 * v - inf)
         return lower, np.where(q >= self.upper + 0 * q, np.maximum(back, -v), 0 * v + inf)
@@ -86,7 +86,7 @@ class RigidStops(SetValued):
         return np.where(depth > _near(np.where(q < lower, lower, upper)), depth, 0.0)
 
     def snapped(self, q: np.ndarray) -> np.ndarray:
-        """Return the position with each joint that touches a stop exactly there."""
+        """Return the position, with joints that touch a stop moved exactly to it."""
         lower, upper = self._levels(q)
         side = self.touched(q)
         return np.where(side < 0, lower, np.where(side > 0, upper, q))

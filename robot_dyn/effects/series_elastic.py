@@ -2,7 +2,7 @@
 
     n² J θ̈ = u − k δ − d δ̇ − b θ̇,     τ = k δ + d δ̇
 
-θ is the motor angle at the output of the gear, u the torque there, n times the torque of the motor. The motion of the
+θ is the motor angle at the output of the gear, u the torque there, n times the torque of the motor. Rotation of the
 rotor with the arm is neglected. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
 """
 
@@ -41,8 +41,8 @@ class SeriesElastic(GearedMotor, Dissipative):
     actuation u of a driven joint is the motor torque at the output of the gear, n times the torque of the rotor. With
     a half gap β the spring exerts no torque while |δ| ≤ β; the damper still acts.
 
-    In the energy ledger the control does its work on the motors; motors and springs store ½ n² J θ̇² + ½ k δ². The
-    motion of the rotors with the arm is neglected.
+    In the energy ledger, control works on the motors; motors and springs store ½ n² J θ̇² + ½ k δ². Rotation of the
+    rotors with the arm is neglected.
 
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative; joints of stiffness 0 are driven directly.

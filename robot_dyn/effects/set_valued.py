@@ -1,9 +1,9 @@
 """Effects that hold joints: at rest, their torque is the value in an interval that keeps the joint at rest.
 
-    τ ∈ −F(v):   one value where v ≠ 0,   an interval where v = 0
+    τ ∈ −F(v):   one value if v ≠ 0,   an interval if v = 0
 
-The mode of a run lists the held joints and the directions in which the others slide. Within a mode the equation of
-motion is smooth; when a torque would leave its interval, or a velocity reaches 0, the mode changes.
+The mode of a run is the set of held joints and the directions in which the others slide. Within a mode the equation of
+motion is smooth; the mode changes when a torque would leave its interval, or a velocity reaches 0.
 [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 """
 
@@ -25,7 +25,7 @@ from robot_dyn.foundations.threshold import smooth
 
 
 class Interval(NamedTuple):
-    """Bounds of the torque on joints at rest, both (n,), in [N m] or [N]; 0 and 0 where the effect does not act."""
+    """Bounds of the torque on joints at rest, both (n,), in [N m] or [N]; both 0 where the effect does not act."""
 
     least: np.ndarray
     most: np.ndarray
@@ -50,12 +50,12 @@ class SetValued(Dissipative):
 
     Attributes:
         held: 1 for held joints, 0 for the others, (n,); None before a mode is chosen.
-        rubs: True if it is friction, for time stepping.
+        has_friction: True if it is friction, for time stepping.
         stops: True if it has `bounds`, for time stepping.
     """
 
     held: OptionalCoefficientField
-    rubs: ClassVar[bool] = False
+    has_friction: ClassVar[bool] = False
     stops: ClassVar[bool] = False
 
     thresholds = smooth  # within a mode
@@ -116,13 +116,13 @@ def settled(
     return work.a, Mode(held, direction)
 
 
-def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
+def friction_and_bounds(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
     """Return the largest friction, bounds of v⁺ and shares of effects, for a time step with q at its middle.
 
-    Shares, (n,), distribute the friction over several effects with friction, then the bounds over several effects with
-    bounds; there are none for a single effect.
+    Shares, (n,), distribute friction over several effects with friction, and then bounds over several effects with
+    bounds; a single effect has none.
     """
-    rub, stop = [[x for x in effects if getattr(x, kind)] for kind in ("rubs", "stops")]
+    rub, stop = [[x for x in effects if getattr(x, kind)] for kind in ("has_friction", "stops")]
     levels, bounds = [x.friction(v) for x in rub], [x.bounds(q, v) for x in stop]
     friction = sum(levels, start=0 * v)
     lower, upper = 0 * v - np.inf, 0 * v + np.inf
@@ -141,17 +141,17 @@ def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, 
     return friction, lower, upper, shares
 
 
-def impulses_of(effects: Sequence[SetValued], rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
+def split_impulses(effects: Sequence[SetValued], rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
     """Yield the impulse of each effect, from the total impulses of friction and stops and the consecutive shares."""
     n = len(rubbing)
-    rub, stop = (sum(getattr(x, kind) for x in effects) for kind in ("rubs", "stops"))
+    rub, stop = (sum(getattr(x, kind) for x in effects) for kind in ("has_friction", "stops"))
     parts = (shares[k * n : (k + 1) * n] for k in count())
     rub_shares = [next(parts) for _ in range(rub)] if rub > 1 else [np.ones(n)]
     stop_shares = [next(parts) for _ in range(stop)] if stop > 1 else [np.ones(n)]
     rubs, stops = iter(rub_shares), iter(stop_shares)
     for effect in effects:
         impulse = 0 * rubbing
-        if effect.rubs:
+        if effect.has_friction:
             impulse = impulse + next(rubs) * rubbing
         if effect.stops:
             impulse = impulse + next(stops) * stopping

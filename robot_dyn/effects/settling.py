@@ -2,9 +2,9 @@
 
     a = argmin ½ (a − M⁻¹ load)ᵀ M (a − M⁻¹ load) + Σ fᵢ |aᵢ|   over joints at rest, away from stops
 
-Where static friction exceeds sliding friction, joints break away one by one, the one of greatest energy first, and
+If static friction exceeds sliding friction, joints break away one by one, that with the largest |a| √M_ii first, and
 the problem is solved again. A joint that would then move the other way is restored to rest. Like `convex.active_set`,
-these are plain functions of arrays, so that machine code can be made of them.
+these are plain functions of arrays, so that they can be compiled.
 [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 """
 
@@ -25,14 +25,14 @@ class Settling(NamedTuple):
 
     Attributes:
         least, most: Bounds of the torque on a joint at rest, (n,).
-        forced: Direction of joints at rest that break away, else 0, (n,); `settle` adds all that do.
+        forced: Direction of joints at rest that break away, else 0, (n,); `settle` adds those that it finds.
         a: Output: the acceleration, (n,).
         p, f, lower, upper, place: Arrays of the convex problem, (n,).
         rests: 1 for joints that may stay at rest, else 0, (n,).
         friction: Friction that holds these joints, (n,).
         back: 1 for joints that broke away and were restored to rest, else 0, (n,).
         size: Size of the terms that cancel in the acceleration, (n,).
-        L: Matrix for the active set, (n + 1, max(n, 2)): machine code has another type for arrays of one column.
+        L: Matrix for the active set, (n + 1, max(n, 2)): in machine code, arrays of one column have another type.
     """
 
     least: Array
@@ -83,7 +83,7 @@ def settle(
             work.f[i] = work.friction[i] if forced[i] == 0.0 else 0.0
         if not least_value(M, work, a):
             return False
-        if not taken_back(M, load, forced, a, work) and not broken_away(M, slides, forced, a, work):
+        if not restored_joints(M, load, forced, a, work) and not broken_away(M, slides, forced, a, work):
             break
     for i in range(len(v)):
         way = np.sign(v[i]) if v[i] != 0.0 else np.sign(a[i]) * work.rests[i]
@@ -103,7 +103,7 @@ def least_value(M: Array, work: Settling, x: Array) -> bool:
     return total < np.inf
 
 
-def taken_back(M: Array, load: Array, forced: Array, a: Array, work: Settling) -> bool:
+def restored_joints(M: Array, load: Array, forced: Array, a: Array, work: Settling) -> bool:
     """Restore joints that broke away but would move the other way, by more than rounding; return True if any."""
     against, largest, restored = False, 0.0, False
     for i in range(len(a)):
@@ -142,7 +142,7 @@ def weigh(M: Array, load: Array, work: Settling) -> None:
 
 
 def broken_away(M: Array, slides: Array, forced: Array, a: Array, work: Settling) -> bool:
-    """Let the joint of greatest energy whose sliding friction is less break away; return False if there is none."""
+    """Let one joint with sliding below static friction break away, largest |a| √M_ii; return False if there is none."""
     largest, most = -1, -1.0
     for i in range(len(a)):
         was_decided = forced[i] != 0.0 or work.back[i] != 0.0

@@ -22,7 +22,7 @@ class Spring(Conservative):
 
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
-        rest: q₀, a scalar or (n,), in [rad] or [m]. With stiffness="urdf" on an arm whose file states rest positions,
+        rest: q₀, a scalar or (n,), in [rad] or [m]. If stiffness="urdf" and the file states rest positions, it must be
             "urdf" or an array.
 
     Example:

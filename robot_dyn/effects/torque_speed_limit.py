@@ -1,7 +1,7 @@
 """Motors whose torque falls with speed: −τ(max(−v, 0)) ≤ u ≤ τ(max(v, 0)), with a polyline τ of the speed.
 
-A motor that drives (u v > 0) gives |u| ≤ τ(|v|), and nothing beyond its no-load speed; one that brakes gives its peak
-τ(0). With the corners ω_k of the polyline and the changes s_k of its slope there,
+A driving motor (u v > 0) can exert |u| ≤ τ(|v|), which is 0 beyond its no-load speed; a braking motor can exert its
+peak τ(0). With the corners ω_k of the polyline and the changes s_k of its slope there,
 
     τ(ω) = τ(0) + Σ s_k max(ω − ω_k, 0)
 
@@ -18,6 +18,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.effects.effect import Bound, Effect
+from robot_dyn.effects.torque_speed import NO_LINE, TorqueSpeed, check_line
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import (
     ROWS,
@@ -28,13 +29,12 @@ from robot_dyn.foundations.coefficients import (
     with_values,
 )
 from robot_dyn.foundations.errors import EffectError, RobotDynError, shown
-from robot_dyn.foundations.saturation import limits_reached, piece, saturated
+from robot_dyn.foundations.saturation import limit_thresholds, piece, saturated
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
 AT = "joint", "motor"
-_ABSURD = 100.0  # [rad/s] or [m/s]: a joint that seems to be faster has its values at the motor
-_NO_LIMIT = np.zeros(1), np.full(1, inf)
+_MAX_JOINT_SPEED = 100.0  # [rad/s] or [m/s]: higher speeds at the joint must be those of a motor
 
 
 @final
@@ -44,14 +44,14 @@ class TorqueSpeedLimit(Bound):
 
     Attributes:
         speed: Speeds at the corners of the polyline τ, increasing, in [rad/s] or [m/s]: (k,) for all joints, (n, k), or
-            by joint name; joints left out have no limit. τ is constant below the first speed.
-        torque: Peak torques there, in [N m] or [N], which do not increase; the last one is 0, at the no-load speed. A
-            row of inf for a joint without a limit.
-        at: "joint" or "motor", the place of speeds and torques.
-        gear_ratio: N, a scalar or (n,), needed at the motor: the joint has N times its torque, at 1/N of its speed.
+            by joint name; omitted joints have no limit. τ is constant below the first speed.
+        torque: Peak torques there, in [N m] or [N], not increasing; the last one is 0, at the no-load speed. A row of
+            inf for a joint without a limit.
+        at: "joint" or "motor": where speeds and torques are measured.
+        gear_ratio: N, a scalar or (n,), required at the motor: the joint has N times its torque at 1/N of its speed.
 
     Raises:
-        EffectError: If the polyline is invalid, or speeds above 100 rad/s are at the joint: they are those of a motor.
+        EffectError: If the polyline is invalid, or speeds at the joint exceed 100 rad/s, as only those of a motor do.
 
     Example:
         >>> rd.effects.TorqueSpeedLimit(speed=[0.0, 200.0, 350.0], torque=[0.4, 0.4, 0.0], at="motor", gear_ratio=100.0)
@@ -97,17 +97,18 @@ class TorqueSpeedLimit(Bound):
         check_place(self.at, self.gear_ratio is not None, EffectError)
         speed, torque = self._stated
         if isinstance(speed, Mapping) != isinstance(torque, Mapping):
-            raise EffectError("speed and torque must both be by joint name, or both be numbers; give both alike")
+            raise EffectError("speed and torque must both be by joint name or both be arrays")
         if isinstance(speed, Mapping) and speed.keys() != torque.keys():
-            raise EffectError(f"speed and torque name different joints, {shown([*speed])} and {shown([*torque])}")
+            raise EffectError(f"speed and torque have different joints, {shown([*speed])} and {shown([*torque])}")
         for name, (x, y) in self._lines():
             if np.isinf(y).all():
                 continue
-            check_line(f"{self.name}{name}", x, y, EffectError)
+            where = f"{self.name} of {name}" if name else self.name
+            check_line(where, x, y, EffectError)
             if y[-1] != 0:
-                raise EffectError(f"{self.name}{name}: torque must end with 0, at the no-load speed, got {y[-1]:g}")
+                raise EffectError(f"{where}: torque must end with 0, at the no-load speed, got {y[-1]:g}")
             if self.at == "joint":
-                check_speed(f"{self.name}{name}", float(x[-1]), EffectError)
+                check_speed(where, float(x[-1]), EffectError)
 
     @property
     def _stated(self) -> tuple[Any, Any]:
@@ -115,10 +116,10 @@ class TorqueSpeedLimit(Bound):
         return self.speed, self.torque
 
     def _lines(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
-        """Yield the polylines, with the part of a message that names the joint."""
+        """Yield the polylines, with the name of the joint, "" if it is not stated."""
         speed, torque = self._stated
         if isinstance(speed, Mapping):
-            yield from ((f" of {name}", (x, torque[name])) for name, x in speed.items())
+            yield from ((name, (x, torque[name])) for name, x in speed.items())
         elif np.shape(speed) != np.shape(torque):
             shapes = f"{np.shape(speed)} and {np.shape(torque)}"
             raise EffectError(f"{self.name}: speed and torque must have the same shape, got {shapes}")
@@ -129,30 +130,25 @@ class TorqueSpeedLimit(Bound):
         resolved: Any = super().on(dynamics)
         if self._peak is not None:
             return resolved
-        lines = [line for _, line in self._lines()]
-        if isinstance(stated := self._stated[0], Mapping):
-            by_name = dict(zip(stated, lines, strict=True))
-            lines = [by_name.get(name, _NO_LIMIT) for name in dynamics.joint_names]
-        lines *= dynamics.n if len(lines) == 1 else 1
-        if len(lines) != dynamics.n:
-            raise EffectError(f"{self.name}: speed has rows for {len(lines)} joints, but the arm has {dynamics.n}")
-        size = max(len(line[0]) for line in lines)
-        speed, torque = (
-            np.array([np.pad(line[k], (0, size - len(line[k])), "edge") for line in lines]) for k in (0, 1)
-        )
-        limited = np.isfinite(torque[:, 0])
+        rows = [(name, np.stack(line)) for name, line in self._lines()]
+        if isinstance(self._stated[0], Mapping):
+            rows = [(name, dict(rows).get(name, NO_LINE)) for name in dynamics.joint_names]
+        rows *= dynamics.n if len(rows) == 1 else 1
+        if len(rows) != dynamics.n:
+            raise EffectError(f"{self.name}: speed has rows for {len(rows)} joints, but the arm has {dynamics.n}")
+        lines = TorqueSpeed.padded([line for _, line in rows])
         ratio = np.broadcast_to(1.0 if resolved.gear_ratio is None else resolved.gear_ratio, dynamics.n)
-        peak, corners, slopes = _hinges(
-            speed / ratio[:, None], np.where(limited[:, None], torque * ratio[:, None], 1.0)
-        )
+        at_joint = TorqueSpeed(lines.speed / ratio[:, None], lines.torque * ratio[:, None])
+        slopes = np.diff(at_joint.slopes).T
         tables = {
-            "_peak": peak,
-            "_corners": corners,
+            "_peak": at_joint.finite[:, 0],
+            "_corners": at_joint.speed.T,
             "_slopes": np.array([slopes] * 2),
+            "_floors": np.zeros((2, *slopes.shape)),
+            "_limit": np.where(lines.exists, 1.0, inf),
             "_middle": np.zeros(dynamics.n),
         }
-        floors, limit = np.zeros((2, *slopes.shape)), np.where(limited, 1.0, inf)
-        return with_values(resolved, tables | {"_floors": floors, "_limit": limit, "speed": speed, "torque": torque})
+        return with_values(resolved, tables | {"speed": lines.speed, "torque": lines.torque})
 
     @property
     def _tables(self) -> tuple[Any, ...]:
@@ -171,7 +167,7 @@ class TorqueSpeedLimit(Bound):
             for sign in ((1, -1)[way],)
         }
         passed = (Threshold(i, x, "torque–speed corner", "passed", "left", of_velocity=True) for i, x in levels)
-        return (*passed, *limits_reached(limit, middle, n))
+        return (*passed, *limit_thresholds(limit, middle, n))
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
         _, corners, slopes, floors, limit, _ = self._tables
@@ -191,13 +187,13 @@ class TorqueSpeedLimit(Bound):
         return middle + saturated(u - middle, half * limit, half * place)
 
     def limited(self, u: Array, v: Array) -> Array:
-        """Return the place of u between both limits at v, −1 at the lower and 1 at the upper one; 0 in the middle."""
+        """Return the position of u between the limits at v: −1 at the lower, 0 in the middle, 1 at the upper limit."""
         middle, half = self._range(v)
         return (u - middle) / half
 
     @property
-    def limits_joint(self) -> np.ndarray:
-        """True for joints with a limit, (n,); of an effect in a plant."""
+    def is_limited(self) -> np.ndarray:
+        """True for joints with a limit, (n,); defined for an effect in a plant."""
         return np.isfinite(self._tables[4])
 
     def _range(self, v: Array) -> tuple[Array, Array]:
@@ -212,7 +208,7 @@ class TorqueSpeedLimit(Bound):
 
 
 def check_place(at: object, has_ratio: bool, error: type[RobotDynError]) -> None:
-    """Raise an error unless values are at the joint, or at the motor with a gear ratio."""
+    """Raise an error unless values are at the joint without a gear ratio, or at the motor with one."""
     if not isinstance(at, str) or at not in AT:
         raise error(f"at must be joint or motor, got {shown(at)}")
     if (at == "motor") != has_ratio:
@@ -220,30 +216,10 @@ def check_place(at: object, has_ratio: bool, error: type[RobotDynError]) -> None
         raise error(f"values at the {at} {'need a' if at == 'motor' else 'have no'} gear ratio: {more}")
 
 
-def check_line(name: str, speed: np.ndarray, torque: np.ndarray, error: type[RobotDynError]) -> None:
-    """Raise an error unless the speeds of a polyline increase, and its torques do not."""
-    if np.shape(speed) != np.shape(torque):
-        raise error(f"{name}: there are {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
-    if not torque[0] > 0:
-        raise error(f"{name}: torque must begin with a positive value, got {torque[0]:g}")
-    step = np.diff(speed)
-    if ((step < 0) | ((step == 0) & (np.diff(torque) != 0))).any():
-        raise error(f"{name}: speed must increase from point to point, got {shown(np.asarray(speed).tolist())}")
-    if (np.diff(torque) > 0).any():
-        raise error(f"{name}: torque must not increase with speed, got {shown(np.asarray(torque).tolist())}")
-
-
 def check_speed(name: str, speed: float, error: type[RobotDynError]) -> None:
     """Raise an error for a speed of a motor that is stated at the joint."""
-    if speed > _ABSURD:
+    if speed > _MAX_JOINT_SPEED:
         raise error(
-            f"{name}: {speed:.4g} rad/s ({speed * 30 / np.pi:.4g} rpm) at the joint is the speed of a motor before its"
-            " gear: set at to motor and give the gear ratio, 1 for a joint without a gear"
+            f"{name}: {speed:.4g} rad/s ({speed * 30 / np.pi:.4g} rpm) at the joint must be the speed of a motor before"
+            " its gear; set at to motor and give the gear ratio, 1 without a gear"
         )
-
-
-def _hinges(speed: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return τ(0), (n,), the corners, and the change of slope at each, (k, n), of polylines (n, k)."""
-    step = np.diff(speed)
-    slope = np.divide(np.diff(torque), step, out=np.zeros_like(step), where=step > 0)
-    return torque[:, 0], speed.T, np.diff(np.pad(slope, ((0, 0), (1, 1)))).T

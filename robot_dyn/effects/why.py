@@ -139,7 +139,11 @@ def why_at(state: PlantState, joint: str) -> Why:
         name: tuple(coefficient_texts(_at(force, i), state.types[i : i + 1]).values())
         for name, force in zip(state.effects, plant.forces, strict=True)
     }
-    rests = state.of_tau and state.v[i] == 0 and any(x.rubs or x.stops for x in plant.equation_of_motion.set_valued)
+    rests = (
+        state.is_forward
+        and state.v[i] == 0
+        and any(x.has_friction or x.stops for x in plant.equation_of_motion.set_valued)
+    )
     needed = sum(share.inertia + share.coriolis + share.gravity for share in shares) + sum(effects.values())
     tau = float(state.tau[i])
     return Why(joint, tau, unit("tau", state.types[i]), shares, effects, tau - needed if rests else 0.0, texts)
@@ -148,6 +152,6 @@ def why_at(state: PlantState, joint: str) -> Why:
 def _at(force: Force, i: int) -> Force:
     """Return a force with its coefficients at one joint."""
     numbers = {
-        name: getattr(force, name) for name, declared_as in declared(type(force)).items() if declared_as.of_joints
+        name: getattr(force, name) for name, declared_as in declared(type(force)).items() if declared_as.is_per_joint
     }
     return with_values(force, {name: x[i] if np.ndim(x) else x for name, x in numbers.items()})

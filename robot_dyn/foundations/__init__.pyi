@@ -47,8 +47,8 @@ from robot_dyn.foundations.errors import SweepError as SweepError
 from robot_dyn.foundations.errors import TraceError as TraceError
 from robot_dyn.foundations.errors import UndecidedError as UndecidedError
 from robot_dyn.foundations.errors import VideoError as VideoError
-from robot_dyn.foundations.errors import because as because
 from robot_dyn.foundations.errors import escaped as escaped
+from robot_dyn.foundations.errors import located_message as located_message
 from robot_dyn.foundations.errors import nearest as nearest
 from robot_dyn.foundations.errors import shorten as shorten
 from robot_dyn.foundations.errors import shown as shown

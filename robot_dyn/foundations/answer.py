@@ -1,4 +1,4 @@
-"""Answers: values that are shown as the same lines and tables in a terminal and in a notebook, and stored as JSON."""
+"""Results shown as lines and tables, alike in a terminal and a notebook, and stored as JSON."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Table:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Headings of the columns that hold texts; the others hold numbers."""
+        """Headings of the left-aligned columns: those with texts, except those in `right`."""
         columns = zip(self.heading, zip(*self.rows, strict=True), strict=True) if self.rows else ()
         texts = (name for name, cells in columns if any(isinstance(cell, str) for cell in cells))
         return tuple(name for name in texts if name not in self.right)
@@ -50,12 +50,12 @@ class Table:
 
     @property
     def widths(self) -> list[int]:
-        """Width of each column, in letters: its longest cell or heading."""
+        """Width of each column, in characters: its longest cell or heading."""
         return [max(map(len, column)) for column in zip(self.heading, *self.cells, strict=True)]
 
     @property
     def least_widths(self) -> list[int]:
-        """Smallest width of each column, in letters: its longest cell, or its longest word if texts may be wrapped."""
+        """Minimum width of each column, in characters: its longest cell, or its longest word if it may be wrapped."""
         columns = zip(self.heading, self.widths, zip(self.heading, *self.cells, strict=True), strict=True)
         return [
             max(len(word) for cell in column for word in cell.split() or [""])
@@ -77,9 +77,9 @@ class Table:
         return 1
 
     def within(self, width: int) -> Iterator[Table]:
-        """Yield the table in parts of at most `width` letters a line, each with the columns that identify a row.
+        """Yield parts of the table up to `width` characters wide, each with the columns that identify a row.
 
-        A part with one further column may be wider.
+        A part with only one further column may be wider.
         """
         least, keys = self.least_widths, list(range(self.keys))
         parts = [[*keys]]
@@ -93,7 +93,7 @@ class Table:
             yield replace(self, heading=tuple(self.heading[k] for k in part), rows=rows)
 
     def fitted(self, width: int) -> list[int]:
-        """Return the width of each column in lines of `width` letters; columns of long texts share the rest."""
+        """Return the width of each column in lines of `width` characters; columns of long texts share the rest."""
         fitted, widths = self.least_widths, self.widths
         spare = width - sum(fitted) - 2 * (len(fitted) - 1)
         open_columns = sorted(range(len(fitted)), key=lambda k: widths[k] - fitted[k])
@@ -112,7 +112,7 @@ class Table:
 
 
 def number_or_dash(x: float, digits: int = 6) -> str:
-    """A number as text, a dash if it is infinite or not a number."""
+    """Return a number as text, or a dash if it is infinite or not a number."""
     return f"{x:.{digits}g}" if isfinite(x) else "—"
 
 
@@ -154,7 +154,7 @@ class Answer:
 
 
 def html_of(blocks: Iterable[Block]) -> Iterator[str]:
-    """Return texts and tables as parts of a page."""
+    """Yield texts and tables as HTML."""
     from robot_dyn.foundations import display
 
     for is_text, group in groupby(blocks, lambda block: isinstance(block, str)):

@@ -1,8 +1,8 @@
-"""Arithmetics of the equations: float32, float64, longdouble, or balls with a proven radius.
+"""Number types of the equations: float32, float64, longdouble, or balls with a proven radius.
 
-Every formulation is written once with NumPy's operators; an `Arithmetic` converts the literals of a file, and the
-functions below fill the gaps of NumPy for other kinds of numbers. A ball is an interval midpoint ± radius that
-certainly contains the exact value [Johansson, Arb, 2017].
+Every formulation is written once with NumPy's operators. An `Arithmetic` converts the literals of a file; the functions
+below extend NumPy to other kinds of numbers. A ball is an interval midpoint ± radius that contains the exact value
+[Johansson, Arb, 2017].
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class Arithmetic(ABC):
 
     @abstractmethod
     def number(self, literal: Numeral) -> Any:
-        """Return one number from the text of a file, or from a number, which is converted exactly if possible.
+        """Return one number, of the type of array entries, from the text of a file or from a number.
 
-        Its type is the type of the entries of arrays: no type has the operators of floats, balls and symbols.
+        Numbers are converted exactly if possible. The type is `Any` because no type covers floats, balls and symbols.
         """
 
     @abstractmethod
@@ -92,9 +92,9 @@ class Float(Arithmetic):
 
 FLOAT64 = Float(np.dtype(np.float64))
 
-MOST_BITS = 1_000_000  # largest precision of a ball: a product then takes milliseconds
+MAX_BITS = 1_000_000  # largest precision of a ball: a product then takes milliseconds
 
-# flint keeps one working precision for the whole process, so balls of two precisions must take turns.
+# flint has one working precision per process, so only one precision can be in use at a time.
 _flint_turn = RLock()
 
 
@@ -111,7 +111,7 @@ class Ball(Arithmetic):
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bits", integer("bits of a Ball", self.bits, least=2, most=MOST_BITS))
+        object.__setattr__(self, "bits", integer("bits of a Ball", self.bits, least=2, most=MAX_BITS))
 
     def number(self, literal: Numeral) -> arb:
         from flint import arb
@@ -185,7 +185,7 @@ def _per_ball(x: Array, function: Callable[[arb], float]) -> Array:
     balls = np.asarray(x, dtype=object)
     if not all(isinstance(ball, arb) for ball in balls.flat):
         raise QueryError(
-            f"give an array of balls, such as a result of rd.Lagrangian(robot, rd.accuracy.Ball(200)), got {shown(x)}"
+            f"expected an array of balls, for example from rd.Lagrangian(robot, rd.accuracy.Ball(200)), got {shown(x)}"
         )
     return np.vectorize(function, otypes=[float])(balls)
 
@@ -212,7 +212,7 @@ def apply(A: Array, x: Array) -> Array:
 
 
 def symmetric(A: Array) -> Array:
-    """Return A (..., m, m), symmetric up to rounding, with its lower triangle copied from the upper: less to trace.
+    """Return A (..., m, m), symmetric up to rounding, with the upper triangle copied to the lower, to trace less.
 
     Arrays of floats are returned unchanged, for speed.
     """
@@ -223,7 +223,7 @@ def symmetric(A: Array) -> Array:
 
 
 def rounding(x: Array) -> str:
-    """Return the name of the numbers that an array is rounded to."""
+    """Return the precision of an array for messages: "float64", or "balls of 200 bits"."""
     if x.dtype.kind == "f":
         return x.dtype.name
     from flint import ctx

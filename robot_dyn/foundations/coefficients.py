@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     CoefficientInput = ArrayLike | Mapping[str, ArrayLike]  # numbers, values by joint name, or "urdf"
 
-URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
-URDF_SOFT = "urdf_soft"  # as the position of a stop: the soft limit in the robot's file
+URDF = "urdf"  # value of a coefficient that is replaced by the value in the robot's file
+URDF_SOFT = "urdf_soft"  # position of a stop that is replaced by the soft limit in the robot's file
 _KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
 ROWS = (("k",), ("n", "k"))  # a list of numbers for all joints, or one for each joint
@@ -35,12 +35,12 @@ Checked = float | np.ndarray | Mapping[str, float] | Mapping[str, np.ndarray] | 
 Owner = TypeVar("Owner")  # an effect, controller or reference
 
 
-class Jointed(Protocol):
+class HasJointNames(Protocol):
     """An arm with named joints."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of its joints, in the order of q."""
+        """Names of the joints, in the order of q."""
         ...
 
 
@@ -84,7 +84,7 @@ class Coefficient:
         minimum, exclusive_minimum: Inclusive and exclusive lower bound; None for no bound.
         infinite: True if ±inf is allowed.
         fill_value: Value for joints that are not named.
-        stated: The attribute of a `Robot` that "urdf" refers to; "" if files do not state this coefficient.
+        stated: Attribute of a `Robot` that "urdf" refers to; "" if a URDF cannot state this coefficient.
         can_vary: True if it may vary from run to run in `rollouts`.
     """
 
@@ -112,13 +112,13 @@ class Coefficient:
             raise EffectError(f"shapes must be tuples, such as ((), ('n',)), got {shown(shapes)}")
 
     @property
-    def of_joints(self) -> bool:
-        """True if the coefficient is one number for all joints, or one number for each joint."""
+    def is_per_joint(self) -> bool:
+        """True if the coefficient is one number for all joints or one per joint."""
         return self.shapes == JOINTS
 
     @property
-    def of_rows(self) -> bool:
-        """True if the coefficient is a list for all joints, or one for each joint."""
+    def is_list(self) -> bool:
+        """True if the coefficient is one list for all joints or one per joint."""
         return self.shapes == ROWS
 
     def checked(self, name: str, values: object, *, error: type[RobotDynError], allow_unresolved: bool) -> Checked:
@@ -129,10 +129,10 @@ class Coefficient:
         Raises:
             RobotDynError: If the numbers have the wrong shape or sign, or are not finite; its class is `error`.
         """
-        if allow_unresolved and (self.of_joints or self.of_rows) and isinstance(values, Mapping):
+        if allow_unresolved and (self.is_per_joint or self.is_list) and isinstance(values, Mapping):
             if not values:
                 raise error(f"{name} names no joint; give values by joint, or one number for all joints")
-            if self.of_joints:
+            if self.is_per_joint:
                 return values
             rows = replace(self, shapes=(("k",),))
             options: dict[str, Any] = {"error": error, "allow_unresolved": False}
@@ -155,9 +155,9 @@ class Coefficient:
         return float(array) if self.shapes == ((),) else array
 
     def on(
-        self, name: str, values: ArrayLike | Mapping[str, float], dynamics: Jointed
+        self, name: str, values: ArrayLike | Mapping[str, float], dynamics: HasJointNames
     ) -> ArrayLike | Mapping[str, float]:
-        """Return the numbers for the joints of an arm; values by joint name or "urdf" become (n,).
+        """Return the numbers for the joints of an arm: "urdf", and numbers by joint name, become arrays (n,).
 
         Raises:
             EffectError: If a joint is unknown, the file states no value, or the number of joints differs.
@@ -166,10 +166,10 @@ class Coefficient:
         if isinstance(values, Mapping):
             for joint in values.keys() - set(names):
                 raise EffectError(f"{name}: no joint {joint!r}; {nearest(str(joint), names)}")
-            return values if self.of_rows else [values.get(joint, self.fill_value) for joint in names]
+            return values if self.is_list else [values.get(joint, self.fill_value) for joint in names]
         if values is URDF or values is URDF_SOFT:
             return self._stated(name, values, dynamics)
-        if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):
+        if self.is_per_joint and np.ndim(values) and np.shape(values) != (len(names),):
             length = np.shape(values)[0]
             count = f"{length} joint{'s' if length > 1 else ''}"
             raise EffectError(

@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-INK = "#010203"  # stands in figures for the colour of text on the page
+INK = "#010203"  # placeholder in figures for the text colour of the page
 GRID = "#80808055"
-MOST_JOINTS = 8  # largest number of joints whose curves are drawn
-MOST_POINTS = 200  # per curve: longer ones keep the minimum and maximum of each of 100 parts
+MAX_JOINTS = 8  # largest number of joints whose curves are drawn
+MAX_POINTS = 200  # per curve: longer ones keep the minimum and maximum of each of 100 parts
 _COLOURS = ("#4c8bf5", "#e8710a", "#1e9e55", "#d93a8f", "#9a6af0", "#b58900", "#00a3b4", "#8d6e63")
-_WIDE, _HIGH, _BAR = 3.9, 1.6, 0.2  # sizes of a plot, and height of a bar, in [inch]; two plots stand side by side
+_WIDE, _HIGH, _BAR = 3.9, 1.6, 0.2  # width and height of a plot and height of a bar, in [inch]; two plots fit in a row
 _LONGEST = 32  # largest number of characters in the name of a row
-_LARGEST, _LEAST = 1e300, 1e-99  # bounds of linear and logarithmic axes: Matplotlib needs room beyond the ends
-_MOST_ROWS = 40  # a longer table scrolls
+_LARGEST, _MIN = 1e300, 1e-99  # bounds of linear and logarithmic axes: Matplotlib needs room beyond the ends
+_MAX_ROWS = 40  # a longer table scrolls
 _NARROW = 4  # largest number of columns that fit on a narrow page
 _HEAD = (
     '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
@@ -35,7 +35,7 @@ _HEAD = (
     "<title>{title}</title><style>body{{margin:1.5em auto;max-width:72em;padding:0 1em}}"
     "h2{{font:600 1em system-ui,sans-serif;margin:1.6em 0 .4em}}</style></head><body>\n{body}\n</body></html>\n"
 )
-# more specific than the styles of notebooks, which align all cells to the right
+# more specific than the styles of notebooks, which right-align all cells
 _STYLE = (
     "<style>.robot-dyn{font:13px/1.45 system-ui,sans-serif;max-width:70em}"
     ".robot-dyn.robot-dyn table{border-collapse:collapse;font-size:inherit;margin:.5em 0;background:none;color:inherit}"
@@ -87,7 +87,7 @@ def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collecti
     ]
     body = "".join(f"<tr>{row}</tr>" for row in rows)
     whole = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-    look = " ".join(["l"] * (len(rows) > _MOST_ROWS) + ["w"] * is_wide)
+    look = " ".join(["l"] * (len(rows) > _MAX_ROWS) + ["w"] * is_wide)
     return f'<div class="{look}"{" tabindex=0" * ("l" in look)}>{whole}</div>' if look else whole
 
 
@@ -105,8 +105,8 @@ def legend(names: Iterable[str]) -> str:
 
 
 def curves(title: str, summary: str, names: Iterable[str], plots: Sequence[str], more: int) -> str:
-    """Return a block with a summary and plots of curves, and the number of joints that are not drawn."""
-    note = text(f"{more} more joints are not drawn") if more else ""
+    """Return a block with a summary, plots of curves, and a note on the number of joints not drawn."""
+    note = text(f"{more} more joints not drawn") if more else ""
     return page(title, text(summary), legend(names), side_by_side(plots), note)
 
 
@@ -174,11 +174,11 @@ def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
 
 
 def _extremes(values: np.ndarray) -> np.ndarray:
-    """Return indices of finite values: for many samples, of the smallest and the largest in each part."""
+    """Return the indices of finite values; for many samples, those of the minimum and maximum of each part."""
     at = np.flatnonzero(np.isfinite(values))
-    if len(at) <= MOST_POINTS:
+    if len(at) <= MAX_POINTS:
         return at
-    parts = np.array_split(at, MOST_POINTS // 2)
+    parts = np.array_split(at, MAX_POINTS // 2)
     return np.unique([part[which(values[part])] for part in parts for which in (np.argmin, np.argmax)])
 
 
@@ -188,7 +188,7 @@ def bars(label: str, rows: Mapping[str, Mapping[str, float]], causes: Sequence[s
     Args:
         label: Name of the quantity, with the unit.
         rows: Parts of each bar by cause, by the name of the bar; non-finite values are omitted.
-        causes: Causes in the order of colours; the legend names the causes that occur.
+        causes: Causes in the order of their colours; the legend lists those that occur.
     """
     parts = np.array([[row.get(cause, 0.0) for cause in causes] for row in rows.values()]).reshape(
         len(rows), len(causes)
@@ -217,7 +217,7 @@ def levels(label: str, values: Mapping[str, float], limit: float) -> str:
         values: Values by the names of the rows; values that are not both finite and positive are omitted.
         limit: Limit in the unit of the values; omitted unless finite and positive.
     """
-    positive = {name: min(max(x, _LEAST), 1 / _LEAST) for name, x in values.items() if isfinite(x) and x > 0}
+    positive = {name: min(max(x, _MIN), 1 / _MIN) for name, x in values.items() if isfinite(x) and x > 0}
     if not positive:
         return ""
     axes = _axes(label, _BAR * (len(positive) + 2), positive)

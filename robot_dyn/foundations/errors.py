@@ -162,20 +162,20 @@ class PrecisionWarning(RobotDynWarning):
 
 
 def announce(robot: str, findings: Sequence[str], total: int) -> None:
-    """Issue one ModelWarning with the first finding about a robot, at the line that loads it, three calls above.
+    """Issue one ModelWarning with the first finding about a robot, attributed to the line that loads it.
 
     Args:
         robot: Name of the robot.
-        findings: Findings to warn of; without any there is no warning.
+        findings: Findings to warn of; if empty, there is no warning.
         total: Number of all findings.
     """
     if findings:
         more = f" (the first of {total} findings; see Robot.findings or robot-dyn info for all)"
         text = f"{robot}: {findings[0]}{more if total > 1 else ''}"
-        warnings.warn(text, ModelWarning, stacklevel=4)
+        warnings.warn(text, ModelWarning, stacklevel=4)  # the line is three calls above
 
 
-_COMPARED = 48  # compared characters of a name: the time grows with the square
+_COMPARED = 48  # number of characters of a name that are compared: the time grows with its square
 
 
 def shorten(value: object, most: int = 60) -> str:
@@ -239,10 +239,10 @@ def users_line(error: BaseException) -> str:
 
 
 def is_mistake(error: RobotDynError) -> bool:
-    """Return True if user-written code passed an invalid argument to the library, such as one of a wrong shape.
+    """Return True if user-written code passed an invalid argument to the library, for example of a wrong shape.
 
-    A step that cannot be traced, or fails as machine code, is a mistake, too. Other errors of the library in user code
-    are outcomes of a run: numbers that overflow, a singular M.
+    A step that cannot be traced, or fails as machine code, is a mistake, too. Other errors in user code are outcomes
+    of a run: overflow, or a singular M.
     """
     if isinstance(error, TraceError | MachineCodeError):
         return True
@@ -250,7 +250,7 @@ def is_mistake(error: RobotDynError) -> bool:
     return is_invalid and bool(users_line(error))
 
 
-def because(error: BaseException) -> str:
+def located_message(error: BaseException) -> str:
     """Return the message of an exception, with the line of user code that raised it."""
     line = users_line(error)
     message = str(error) if isinstance(error, RobotDynError) else f"{type(error).__name__}: {error}"

@@ -23,8 +23,8 @@ from robot_dyn.foundations.errors import RobotDynError, shown
 _NEW_S = 10.0  # [s]: a younger file may be open and not yet locked
 # Locks distinguish files being written from abandoned ones; Windows needs none, because open files cannot be removed.
 _locks: Any = import_module("fcntl") if os.name == "posix" else None
-# Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
 _PART = 2**24  # bytes per read
+# Without O_NONBLOCK, opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
 _READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
@@ -46,19 +46,19 @@ def target(
     inputs: Iterable[str | Path] = (),
     force: bool = True,
 ) -> Path:
-    """Check the path of a new file before any work; return it, with the suffix of the first kind if it has none.
+    """Check the path of an output file before any work; return it, with the suffix of the first kind if it has none.
 
     Args:
         path: Path of the file.
         kinds: Allowed kinds of file.
         error: Type of the errors.
-        inputs: Files and folders that are read; they must not be replaced, even with `force`.
+        inputs: Files and folders that are read; they are never replaced, even with `force`.
         force: True if an existing file of the same kind may be replaced.
 
     Raises:
         RobotDynError: Of type `error`, if the suffix is wrong; the folder is missing or not writable; the path is
-            something other than a file of its kind, or exists and `force` is False; or the path is one of `inputs` or
-            inside one, even through a link.
+            not a file of its kind, or exists and `force` is False; or the path is one of `inputs` or inside one, even
+            through a link.
     """
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     try:
@@ -122,7 +122,7 @@ def check_folder(path: Path, error: type[RobotDynError]) -> None:
 
 
 def _is_read_only(folder: Path) -> bool:
-    """Return True if the system refuses a new file for reasons other than permissions, such as a read-only disk."""
+    """Return True if a file cannot be created, for example on a read-only disk."""
     handle, name = -1, folder / f".{os.urandom(8).hex()}.unfinished"
     try:
         handle = os.open(name, _NEW, 0o600)
@@ -212,7 +212,7 @@ def _prefix(real: Path) -> str:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on disk, if the system supports it; readers see them before."""
+    """Flush the entries of a folder to disk, if the system supports it."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -243,7 +243,7 @@ def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -
 def csv_rows(
     path: str | Path, most: int, error: type[RobotDynError], remedy: str, *, skip_blank: bool = False
 ) -> Iterator[tuple[str, list[str]]]:
-    """Yield the place, in words, and the entries of each line of a CSV file; the first line names the columns.
+    """Yield the location, for messages, and the entries of each line of a CSV file; the first line names the columns.
 
     Empty lines are skipped; if `skip_blank`, so are lines of only spaces and commas.
 
@@ -271,7 +271,7 @@ def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy:
     with reading(path, error, remedy) as stream:
         try:
             parts, left = [], count
-            while left and (part := stream.read(min(left, _PART))):  # one read would allocate the whole bound
+            while left and (part := stream.read(min(left, _PART))):  # one read would allocate `count` bytes
                 parts.append(part)
                 left -= len(part)
             return b"".join(parts)

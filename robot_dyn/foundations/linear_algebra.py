@@ -1,12 +1,12 @@
 """Linear algebra in any arithmetic: eigenvalues of symmetric matrices, and M x = b for positive definite M.
 
-For floats M x = b is solved by L D Lᵀ; for balls a solution is verified: approximate inverse, residual, enclosure.
+Floats are solved by L D Lᵀ; for balls, a solution is verified: approximate inverse, residual, enclosure.
 
     |x − x̃| ≤ w / (1 − α)   where   w ≥ |R (b − M x̃)|,   |I − R M| w ≤ α w,  α < 1,   R ≈ mid(M)⁻¹,  x̃ ≈ R mid(b)
 
-Elimination in balls would widen them by 5 to 6 bits a row; here the balls of M and b are multiplied once, and R and x̃
-are exact numbers with more bits. Because mid(M) is positive definite and no matrix in the ball is singular, all
-symmetric matrices in the ball are positive definite. [Rump, Verification methods, Acta Numerica 19, 2010, sec. 10]
+Elimination in balls would widen them by 5 to 6 bits per row; here the balls of M and b are multiplied once, and R and x̃
+are exact numbers with more bits. mid(M) is positive definite and no matrix in the ball is singular, so all symmetric
+matrices in the ball are positive definite. [Rump, Verification methods, Acta Numerica 19, 2010, sec. 10]
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _SWEEPS = 8  # Jacobi's method converges quadratically, for six rows in six swee
 def eigh(A: Array) -> tuple[Array, Array]:
     """Compute eigenvalues (..., m) and orthonormal eigenvectors (..., m, m) of symmetric A.
 
-    For float64, LAPACK returns ascending eigenvalues. For other numbers Jacobi's cyclic method with a fixed number of
-    sweeps, which can be traced, returns them in no particular order.
+    For float64, LAPACK returns them in ascending order. For other numbers, Jacobi's cyclic method returns them in no
+    particular order; its fixed number of sweeps allows tracing.
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, sec. 8.5.
     """
@@ -46,7 +46,7 @@ def eigh(A: Array) -> tuple[Array, Array]:
 
 
 def _rotation(app: Array, apr: Array, arr: Array) -> tuple[Array, Array]:
-    """Return cosine and sine of the smaller angle that makes a symmetric 2 × 2 matrix diagonal."""
+    """Return cosine and sine of the smaller angle that diagonalises a symmetric 2 × 2 matrix."""
     d, b = arr - app, 2 * apr
     size = np.abs(d) + sqrt(d * d + b * b)
     t = np.where(d < 0, -1, 1) * b / np.where(size > 0, size, 1)
@@ -59,9 +59,9 @@ def _turned(x: Array, y: Array, c: Array, s: Array) -> tuple[Array, Array]:
 
 
 class NotPositiveDefiniteError(PortableError):
-    """Internal error: a pivot of a factorisation is not positive; the caller translates `row` to a joint.
+    """Internal error: a pivot of a factorisation is not positive; callers map `row` to a joint.
 
-    `decided` is False if the sign of the pivot is lost in rounding.
+    `decided` is False if rounding hides the sign of the pivot.
     """
 
     def __init__(self, row: int, decided: bool) -> None:
@@ -81,15 +81,15 @@ def _lapack_solve(M: Array, b: Array) -> Array | None:
     return np.linalg.solve(M, b[..., None])[..., 0]
 
 
-judging_regularity: ContextVar[bool] = ContextVar("judging_regularity", default=False)  # tracing assumes regularity
+in_regularity_check: ContextVar[bool] = ContextVar("in_regularity_check", default=False)  # tracing assumes regularity
 
 
 def _is_regular(pivot: Array, least: Array, whole: Array) -> bool:
-    token = judging_regularity.set(True)
+    token = in_regularity_check.set(True)
     try:
         return bool(np.all((pivot > least) & (whole > 0)))
     finally:
-        judging_regularity.reset(token)
+        in_regularity_check.reset(token)
 
 
 def cholesky_solve(M: Array, b: Array) -> Array:
@@ -103,8 +103,8 @@ def cholesky_solve(M: Array, b: Array) -> Array:
         The solution, shape (..., n).
 
     Raises:
-        NotPositiveDefiniteError: If a pivot is not certainly positive, with its row: for floats, if it is at most 4 n ε
-            of the diagonal entry; for balls, if it contains numbers that are not positive.
+        NotPositiveDefiniteError: If a pivot is not certainly positive: for floats, if it is at most 4 n ε times the
+            diagonal entry; for balls, if it contains numbers that are not positive.
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 4.1.2.
     """
@@ -124,7 +124,7 @@ def _are_balls(x: Array) -> bool:
 
 
 def _verified_solves(M: Array, b: Array) -> Array | None:
-    """Solve M x = b for balls, without loss of digits by elimination; return None if M may not be regular."""
+    """Solve M x = b for balls without elimination, which loses digits; return None if M may be singular."""
     n = M.shape[-1]
     batch = np.broadcast_shapes(M.shape[:-2], b.shape[:-1])
     matrices, rows = np.broadcast_to(M, (*batch, n, n)), np.broadcast_to(b, (*batch, n))
@@ -148,7 +148,7 @@ def _verified_solve(M: Array, b: Array) -> Array | None:
 
     n, bits = len(b), ctx.prec
     identity = np.array([[arb(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
-    with ctx.workprec(2 * bits + 8 * n + 64):  # elimination of mid(M) loses less than half of it
+    with ctx.workprec(2 * bits + 8 * n + 64):  # elimination of mid(M) loses less than half of these bits
         M = np.where(np.triu(np.ones((n, n), dtype=bool)), M, M.T)
         try:
             inverse = _eliminate(_each(M, "mid")[None], identity)
@@ -176,7 +176,7 @@ def _each(x: Array, name: str) -> Array:
 def _not_positive_definite(M: Array, row: int, pivot: Array) -> NotPositiveDefiniteError:
     """Return the error for a pivot that may not be positive.
 
-    For floats it is certain only if some M_ii ≤ 0, because rounding of M may change the sign of a pivot.
+    For floats, the sign is certain only if some M_ii ≤ 0, because rounding of M may change the sign of a pivot.
     """
     n = M.shape[-1]
     if len(rows := np.flatnonzero(np.any(np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, n) <= 0, axis=0))):

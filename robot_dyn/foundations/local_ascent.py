@@ -1,6 +1,6 @@
 """The largest |f| of a function of the joint positions: random states, and local ascent from the best of them.
 
-A search proves no bound: the largest |f| found is a lower bound of the largest one. [Nocedal, Wright 2006, ch. 16]
+A search does not prove a bound: the largest |f| found is a lower bound of the maximum. [Nocedal, Wright 2006, ch. 16]
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _STARTS = 3  # states from which a local ascent starts
 
 
 def search_box(lower: np.ndarray, upper: np.ndarray, types: Sequence[str | None]) -> tuple[np.ndarray, np.ndarray]:
-    """Return bounds of a search within position limits, (n,) each: at most one turn around 0, or ±1 m of a slide."""
+    """Return search bounds within position limits, (n,) each: at most one turn around 0, or ±1 m if prismatic."""
     slides = np.array([kind == "prismatic" for kind in types])
     half = (upper - lower) / 2
     half = np.where(np.isfinite(half) & slides, half, np.minimum(half, np.where(slides, 1.0, np.pi)))

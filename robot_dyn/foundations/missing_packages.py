@@ -1,7 +1,7 @@
-"""Errors for required packages that are missing, after `pip install --no-deps robot-dyn` with some of them.
+"""Errors for missing required packages, for example after `pip install --no-deps robot-dyn`.
 
-The last entry of `sys.meta_path` is asked for a module only after all others have not found it. It answers imports
-that stand in this package alone, so that other libraries and `importlib.util.find_spec` see no difference.
+Python calls the last finder in `sys.meta_path` only if no other has found the module. This one acts only on imports
+from this package, so that other libraries and `importlib.util.find_spec` are not affected.
 """
 
 from __future__ import annotations
@@ -11,24 +11,23 @@ import sys
 # Modules of required packages; `extras.needs` imports modules of extras.
 _REQUIRED = {
     "PIL", "casadi", "collada", "flint", "llvmlite", "lxml", "matplotlib", "meshcat", "pinocchio", "platformdirs",
-    "pydantic", "pydantic_core", "rich", "scipy", "tornado", "trimesh", "typer", "umsgpack", "yourdfpy", "zmq",
+    "pydantic", "pydantic_core", "rich", "scipy", "trimesh", "typer", "yourdfpy",
 }  # fmt: skip
 # Distributions whose names differ from their modules.
 _DISTRIBUTIONS = {
     "PIL": "pillow", "collada": "pycollada", "flint": "python-flint", "pinocchio": "pin", "pydantic_core": "pydantic",
-    "umsgpack": "u-msgpack-python", "zmq": "pyzmq",
 }  # fmt: skip
 
 
 class MissingPackages:
-    """A finder of modules that finds none, and raises if this package imports a required one."""
+    """A module finder that finds nothing, and raises if this package imports a missing required package."""
 
     @staticmethod
     def find_spec(name: str, path: object = None, target: object = None) -> None:
         """Return None.
 
         Raises:
-            MissingExtraError: If a module of this package imports a required package, which is not installed.
+            MissingExtraError: If a module of this package imports a required package that is not installed.
         """
         if name not in _REQUIRED:
             return
@@ -43,6 +42,6 @@ class MissingPackages:
 
 
 def install() -> None:
-    """Append the finder, once in a process."""
+    """Append the finder, once per process."""
     if MissingPackages not in sys.meta_path:
         sys.meta_path.append(MissingPackages)

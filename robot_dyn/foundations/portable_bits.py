@@ -12,6 +12,6 @@ VARIABLE = "ROBOT_DYN_PORTABLE"
 def has_portable_bits() -> bool:
     """Return True if the machine code of this process is portable, see `codegen.llvm.target`.
 
-    The variable is read once, so that all machine code of a process, and what its runs report, agree.
+    The variable is read once, so that all machine code and all reports of a process agree.
     """
     return os.environ.get(VARIABLE) == "1"

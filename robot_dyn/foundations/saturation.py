@@ -24,13 +24,13 @@ def saturated(u: Array, limit: Array, middle: Array | None) -> Array:
     return middle + np.minimum(np.maximum(u - middle, -limit), limit)
 
 
-def middle_of(limit: object) -> float | None:
-    """Return the middle of a bound as stated: 0, or None if no limit can be reached, or limits are not resolved yet."""
+def initial_middle(limit: object) -> float | None:
+    """Return the initial middle c of a bound: 0, or None if no limit can be reached or limits are not resolved yet."""
     reachable = isinstance(limit, np.ndarray) and (np.isfinite(limit) & (limit > 0)).any()
     return 0.0 if reachable else None
 
 
-def limits_reached(limit: Array, middle: Array | None, n: int) -> tuple[Threshold, ...]:
+def limit_thresholds(limit: Array, middle: Array | None, n: int) -> tuple[Threshold, ...]:
     """Return the thresholds at which the actuation of n joints passes ±u_max."""
     return tuple(
         Threshold(i, sign * float(most), *words, of_actuation=True)
@@ -41,7 +41,7 @@ def limits_reached(limit: Array, middle: Array | None, n: int) -> tuple[Threshol
 
 
 def piece(limit: Array, n: int, sides: Mapping[Threshold, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return limit and middle of the bound, both (n,), on the given sides of its thresholds."""
+    """Return limit l and middle c of the bound, both (n,), for the current side of each threshold."""
     limits, middles = np.broadcast_to(limit, n).copy(), np.zeros(n)
     for threshold in sides:
         limits[threshold.joint] = np.inf

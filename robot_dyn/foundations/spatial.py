@@ -26,10 +26,10 @@ def rotation(axis: Array, angle: Scalar) -> Array:
     Source: Murray, Li, Sastry 1994, eq. 2.14 (Rodrigues' formula).
     """
     A = hat(axis)
-    return turned_about(A, A @ A, angle)
+    return rotation_about(A, A @ A, angle)
 
 
-def turned_about(A: Array, square: Array, angle: Scalar) -> Array:
+def rotation_about(A: Array, square: Array, angle: Scalar) -> Array:
     """Return `rotation` from the skew matrix â of the axis and its square, both (3, 3)."""
     theta = np.asarray(angle)[..., None, None]
     return np.eye(3, dtype=A.dtype) + sin(theta) * A + (1 - cos(theta)) * square
@@ -42,7 +42,7 @@ def rotation_rpy(rpy: Array) -> Array:
 
 
 def rpy_of(R: np.ndarray) -> np.ndarray:
-    """Return roll, pitch and yaw of a rotation (3, 3) in float64; `rotation_rpy` of them is R to rounding.
+    """Return roll, pitch and yaw of a rotation (3, 3) in float64; `rotation_rpy` maps them back to R within rounding.
 
     Roll is computed from Rzᵀ(yaw) R: at a pitch of ±π/2, where rounding determines the yaw, roll compensates for it.
     """
@@ -94,7 +94,7 @@ def homogeneous(R: Array, p: Array) -> Array:
 
 
 def block_diagonal(R: Array) -> Array:
-    """Return diag(R, R), which rotates both parts of a twist, shape (..., 6, 6)."""
+    """Return diag(R, R), shape (..., 6, 6), which rotates both parts of a twist."""
     return _upper_blocks(R, np.zeros_like(R))
 
 

@@ -1,7 +1,7 @@
 """Files of values: the arrays of a dataclass as .npz, other fields as JSON by pydantic, with limits on sizes.
 
-The member `about` is the JSON: a format and the fields of the value. Each array is another member; its field in the
-JSON contains the name of this member, which is the path of the field, for example `ledger/kinetic`.
+The member `about` is JSON with the format and the fields of the value. Each array is another member, named by the path
+of its field, for example `ledger/kinetic`; the field in the JSON contains this name.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ABOUT = "about"
 _LONGEST = 10_000  # largest number of characters in a name
-_MOST = 20  # largest ratio of unpacked to packed bytes; an array of zeros has 1000
+_MAX = 20  # largest ratio of unpacked to packed bytes; an array of zeros has 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
@@ -42,7 +42,7 @@ class StoreError(RobotDynError):
 @final
 @dataclass
 class Members:
-    """The members of a file while the fields of a value are read from them.
+    """State of reading a file: its arrays, and facts about those already read.
 
     Attributes:
         arrays: Arrays that no field has read yet, by name.
@@ -60,7 +60,7 @@ class Layout:
     """Form of an array in a file, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
 
     Attributes:
-        shape: Lengths of the axes: a number; a letter for the same length in all arrays of a file; None for any length;
+        shape: Length of each axis: a number; a letter for the same length in all arrays of a file; None for any length;
             or a tuple of alternatives.
         dtype: Type of the entries.
         finite: True if nan and inf are errors unless the run diverged.
@@ -122,7 +122,7 @@ class StoredFormat(Generic[Stored]):
     """A format of files of values.
 
     Attributes:
-        name: Name or number of the format; it changes with the form of the files.
+        name: Name or number of the format; it changes whenever the content of the files changes.
         value_type: Type of the values, a dataclass whose arrays have a `Layout`.
         kind: Kind of the files.
         error: Type of the errors.
@@ -160,9 +160,7 @@ class StoredFormat(Generic[Stored]):
             self.value(dict(arrays))
             return save(path, lambda stream: write_arrays(stream, arrays), self.error)
         except (StoreError, TypeError, ValueError) as error:
-            raise self.error(
-                f"{path}: cannot be written: {error}; save a value unchanged, as the library returned it"
-            ) from None
+            raise self.error(f"{path}: cannot be written: {error}; save the value as the library returned it") from None
 
     def load(self, path: str | Path, *others: StoredFormat[Other]) -> Stored | Other:
         """Return the value of a file in this format, or in another format of the same kind of file.
@@ -233,7 +231,7 @@ def _without_arrays(value: Any, path: str, arrays: dict[str, np.ndarray]) -> Any
 
 
 def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays as .npz, compressed unless the ratio exceeds half the limit of readers.
+    """Write arrays as .npz, compressed unless the ratio exceeds half the readers' limit.
 
     Raises:
         StoreError: If a name is not a valid name of a member.
@@ -242,7 +240,7 @@ def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
         raise StoreError(f"a name has a NUL, or more than {_LONGEST} characters; use a shorter one, without NUL")
     ordered: dict[str, Any] = {name: np.asarray(x, order="C") for name, x in arrays.items()}
     np.savez_compressed(stream, **ordered)
-    if sum(x.nbytes for x in ordered.values()) > _MOST / 2 * stream.tell():
+    if sum(x.nbytes for x in ordered.values()) > _MAX / 2 * stream.tell():
         stream.seek(0)
         stream.truncate()
         np.savez(stream, **ordered)
@@ -255,13 +253,13 @@ def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
         StoreError: If the file is damaged or cut short, contains other data, or unpacks to over 20 times its size.
     """
     try:
-        most = _MOST * stream.seek(0, SEEK_END)
+        most = _MAX * stream.seek(0, SEEK_END)
         with zipfile.ZipFile(stream) as file:
             members = {member.filename.removesuffix(".npy"): member for member in file.infolist()}
             if len(members) < len(file.infolist()):
                 raise StoreError("it contains two members with the same name")
             if (size := sum(member.file_size for member in members.values())) > most:
-                raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
+                raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MAX} times its size")
             return {name: _array(file, name, member) for name, member in members.items()}
     except StoreError:
         raise

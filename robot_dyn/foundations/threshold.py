@@ -1,4 +1,4 @@
-"""Levels at which an effect or a controller switches between smooth formulas, and layers in which a formula bends."""
+"""Levels at which an effect or controller switches between smooth formulas, and layers in which a formula bends."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import final
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.validate import instance, integer, number, truth
 
-_MOST = 10**6  # largest index of a joint or a state
+_MAX = 10**6  # largest index of a joint or a state
 
 
 @final
@@ -20,11 +20,11 @@ class Threshold:
         joint: Index of the joint.
         level: Level in [rad] or [m], [rad/s] or [m/s], or [N m] or [N].
         name: Name of the level, such as "upper stop".
-        rising, falling: Events when the coordinate rises or falls through it, such as "touched" and "left".
+        rising, falling: Names of the events when the coordinate rises or falls through it, such as "touched", "left".
         of_velocity: True for a level of the velocity.
-        of_actuation: True for a level of the actuation at the input of a bound, or of a controller's demand.
-        state: Index of the effect's state that passes the level instead of a coordinate of the joint; None for none.
-        slack: Distance past the level at which a position or a velocity counts as past it; rounding is the minimum.
+        of_actuation: True for a level of the actuation before a bound, or of a controller's demand.
+        state: Index of the effect's state that passes the level; None for a coordinate of the joint.
+        slack: Distance beyond the level that counts as past it; never less than rounding.
 
     Raises:
         EffectError: If an attribute has another type, the level is not finite, or it is a level of two coordinates.
@@ -41,18 +41,18 @@ class Threshold:
     state: int | None = None
 
     def __post_init__(self) -> None:
-        integer("joint", self.joint, most=_MOST, error=EffectError)
+        integer("joint", self.joint, most=_MAX, error=EffectError)
         object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         object.__setattr__(self, "slack", number("slack", self.slack, least=0, error=EffectError))
         if self.state is not None:
-            integer("state", self.state, most=_MOST, error=EffectError)
+            integer("state", self.state, most=_MAX, error=EffectError)
         for name in ("name", "rising", "falling"):
             instance(name, getattr(self, name), str, "give a text", error=EffectError)
         for name in ("of_velocity", "of_actuation"):
             truth(name, getattr(self, name), error=EffectError)
         if self.of_velocity + self.of_actuation + (self.state is not None) > 1:
             raise EffectError(
-                f"{self.name}: a threshold has one coordinate; set only one of of_velocity, of_actuation and state"
+                f"{self.name}: a threshold has one coordinate; set at most one of of_velocity, of_actuation and state"
             )
 
     @property
@@ -84,15 +84,15 @@ class Layer:
     state: int | None = None
 
     def __post_init__(self) -> None:
-        integer("joint", self.joint, most=_MOST, error=EffectError)
+        integer("joint", self.joint, most=_MAX, error=EffectError)
         object.__setattr__(self, "width", number("width", self.width, above=0, error=EffectError))
         if self.level is not None:
             object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         if self.state is not None:
-            integer("state", self.state, most=_MOST, error=EffectError)
+            integer("state", self.state, most=_MAX, error=EffectError)
         truth("of_velocity", self.of_velocity, error=EffectError)
         if self.of_velocity and self.state is not None:
-            raise EffectError("a layer has one coordinate; set only one of of_velocity and state")
+            raise EffectError("a layer has one coordinate; set at most one of of_velocity and state")
 
 
 def smooth(self: object, n: int = 0) -> tuple[Threshold, ...]:

@@ -1,6 +1,6 @@
 """Checks of arguments of public functions: real numbers, shape and sign; counts; names; types.
 
-A check returns the argument in one form, or raises the `error` of its caller with one sentence: the requirement and the
+A check returns the argument in one form, or raises the caller's `error` with one sentence: the requirement and the
 value. Time loops skip these checks.
 """
 
@@ -29,11 +29,11 @@ from robot_dyn.foundations.errors import (
 
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
-JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike]]
-"""Numbers of each joint, (..., n); or by joint name, (...), where joints left out have 0; or a list of such rows."""
+JointValues: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike] | ArrayLike]
+"""Numbers of each joint, (..., n); or by joint name, (...), with 0 for omitted joints; or a list of such rows."""
 Instance = TypeVar("Instance")
 Function = TypeVar("Function")
-LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
+MAX_ROUNDING_ERROR = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
 _F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # usual types of entries in lists; bool is excluded
 
@@ -222,12 +222,12 @@ def shaped(
 
     Args:
         label: Name of the argument in messages.
-        values: The argument: an array, or numbers by joint name, of shape (…); joints left out have 0.
+        values: The argument: an array, or numbers by joint name, of shape (…), with 0 for omitted joints.
         joint_names: Names of the n joints.
         arithmetic: An `Arithmetic`; float64 by default.
 
     Raises:
-        QueryError: If they are not real numbers, have another shape, or a name is not that of a joint.
+        QueryError: If they are not real numbers, have another shape, or a joint is unknown.
     """
     n = len(joint_names)
     try:
@@ -244,27 +244,31 @@ def shaped(
 def in_order(
     label: str, values: object, joint_names: Sequence[str] | None, *, fill_value: float = 0.0, error: Kind = QueryError
 ) -> Any:
-    """Return numbers by joint name, or a list of such rows, as an array, (..., n); other values as they are.
+    """Return numbers by joint name, or a list with such rows, as an array, (..., n); other values unchanged.
 
     Args:
         label: Name of the argument in messages.
         values: The argument.
-        joint_names: Names of the n joints, in the order of q; None if the caller was given none.
-        fill_value: Number of joints left out.
+        joint_names: Names of the n joints, in the order of q; None if unknown.
+        fill_value: Number for omitted joints.
         error: Type of the error.
     """
-    if isinstance(values, list | tuple) and values and all(isinstance(row, Mapping) for row in values):
-        rows = [
-            in_order(f"{label}[{i}]", row, joint_names, fill_value=fill_value, error=error)
-            for i, row in enumerate(values)
-        ]
-        return np.stack(_one_shape(label, dict(enumerate(rows)), error))
-    if not isinstance(values, Mapping):
+    rows = values if isinstance(values, list | tuple) else ()
+    if not isinstance(values, Mapping) and not any(isinstance(row, Mapping) for row in rows):
         return values
     if joint_names is None:
-        raise error(f"{label}: numbers by joint have no order here; give joint_names=, such as arm.joint_names")
+        raise error(f"{label}: numbers by joint name need an order; give joint_names=arm.joint_names")
+    if rows:
+        arrays = {
+            i: in_order(f"{label}[{i}]", row, joint_names, fill_value=fill_value, error=error)
+            if isinstance(row, Mapping)
+            else numbers(f"{label}[{i}]", row, (len(joint_names),), error=error)
+            for i, row in enumerate(rows)
+        }
+        return np.stack(_one_shape(label, arrays, error))
+    assert isinstance(values, Mapping)
     if not values:
-        raise error(f"{label}: no joint is named; give numbers by joint, such as {{{joint_names[0]!r}: 0.1}}")
+        raise error(f"{label}: no joint is named; give numbers by joint, for example {{{joint_names[0]!r}: 0.1}}")
     for name in values:
         if name not in joint_names:
             raise error(f"{label}: no joint {shown(name)}; {nearest(str(name), joint_names)}")
@@ -286,7 +290,7 @@ def converted(
 
     Raises:
         NotFiniteError: If a number is not finite; the message names the joint.
-        OverflowedError: If rounding changes the position q or the time t by more than LEAST_EXACT.
+        OverflowedError: If rounding changes the position q or the time t by more than MAX_ROUNDING_ERROR.
     """
     dtype = _F8 if arithmetic is None else arithmetic.dtype
     numbers = array
@@ -299,13 +303,13 @@ def converted(
 
 
 def _check_rounding(label: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
-    """Raise an OverflowedError if numbers were rounded and the arithmetic does not resolve LEAST_EXACT there."""
-    far = np.finfo(rounded.dtype).eps * np.abs(rounded) > LEAST_EXACT
+    """Raise an OverflowedError if numbers were rounded and the arithmetic does not resolve MAX_ROUNDING_ERROR there."""
+    far = np.finfo(rounded.dtype).eps * np.abs(rounded) > MAX_ROUNDING_ERROR
     if far.any() and (lost := far & (exact.astype(np.longdouble) != rounded)).any():
         place = tuple(np.argwhere(lost)[0])
         joint = "" if label == "t" else f" of joint {joint_names[place[-1]]!r}"
         raise OverflowedError(
-            f"{label}{joint} is so large that {rounded.dtype} does not resolve {LEAST_EXACT:g} rad, m or s, got"
+            f"{label}{joint} is too large for {rounded.dtype} to resolve {MAX_ROUNDING_ERROR:g} rad, m or s, got"
             f" {exact[place]}; use a smaller value, or a dtype with more digits"
         )
 
@@ -382,5 +386,5 @@ def instance(label: str, value: object, kind: UnionType, remedy: str, *, error: 
 def instance(label: str, value: object, kind: type | UnionType, remedy: str, *, error: Kind = QueryError) -> object:
     """Return an object of a type; the remedy in the message describes how to get one."""
     if not isinstance(value, kind):
-        raise error(f"{label}: {remedy}, got {shown(value)}")
+        raise error(f"{label}: got {shown(value)}; {remedy}")
     return value

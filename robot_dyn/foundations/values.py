@@ -1,4 +1,4 @@
-"""Value classes whose arrays stay read-only in copies, values computed on first access, caches, aligned arrays."""
+"""Value classes whose arrays stay read-only in copies, fields computed on first access, caches, aligned arrays."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
     from numpy.typing import ArrayLike, DTypeLike
 
-LINE = 64  # bytes of a cache line and of the widest vector: a vector across two lines takes two accesses
+LINE = 64  # bytes of a cache line and of the widest vector; a vector that crosses a line needs two accesses
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
 Key = TypeVar("Key")
 Item = TypeVar("Item")
 
-_MOST = 64  # largest number of values in a cache by identity
+_MAX = 64  # largest number of values in a cache by identity
 
 
 class Value:
@@ -49,7 +49,7 @@ class ReadOnly(Value):
 
 
 class ArrayField(Protocol):
-    """The type of a field that accepts numbers and is read as an array."""
+    """The type of a field that accepts any numbers and returns an array."""
 
     def __get__(self, part: object, kind: type | None = None) -> np.ndarray: ...
 
@@ -89,7 +89,7 @@ def cached(
 
 @final
 class LRUByIdentity(Generic[Item]):
-    """A cache of the latest values by hashable keys and by the identity of objects, as long as these exist."""
+    """A cache of recent values by hashable keys and by the identity of objects, as long as the objects exist."""
 
     def __init__(self) -> None:
         self._values: dict[tuple[Hashable, ...], tuple[list[weakref.ref[object]], Item]] = {}
@@ -103,7 +103,7 @@ class LRUByIdentity(Generic[Item]):
             if entry is None or any(ref() is not x for ref, x in zip(entry[0], objects, strict=True)):
                 entry = [weakref.ref(x) for x in objects], compute()
             self._values[key] = entry
-            while len(self._values) > _MOST or any(ref() is None for ref in next(iter(self._values.values()))[0]):
+            while len(self._values) > _MAX or any(ref() is None for ref in next(iter(self._values.values()))[0]):
                 del self._values[next(iter(self._values))]
             return entry[1]
 
@@ -118,7 +118,7 @@ class LRUByIdentity(Generic[Item]):
 class Derived(ReadOnly):
     """A frozen dataclass that may be built from a source: a field is read from the source on first access.
 
-    Such a field has no default except a factory: a default of the class would hide the source.
+    Such a field must not have a default, except a factory: a class attribute would hide the source.
     """
 
     if not TYPE_CHECKING:  # so that a type checker reports names that are not fields
@@ -126,10 +126,10 @@ class Derived(ReadOnly):
         def __getattr__(self, name: str) -> Any:
             values = vars(self)
             if name in self.__dataclass_fields__ and (source := values.get("_source")) is not None:
-                values.setdefault(name, _frozen(getattr(source, name)))  # two threads may compute it, and get one value
+                values.setdefault(name, _frozen(getattr(source, name)))  # if two threads compute it, both get one value
                 if self.__dataclass_fields__.keys() <= values.keys():
                     values.pop("_source", None)  # nothing more is read from it
-            if name not in values:  # another thread may have read it, and the last one, by now
+            if name not in values:  # checked last: another thread may have read the field and removed the source
                 raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
             return values[name]
 

@@ -1,4 +1,4 @@
-"""Long waits are reported by logging: to the logger "robot_dyn", at level INFO.
+"""Logging of long waits, to the logger "robot_dyn" at level INFO.
 
 A script that does not configure logging prints nothing; the command line prints the messages to standard error.
 """
@@ -16,7 +16,7 @@ PATIENCE_S = 2.0  # a shorter wait is not reported
 
 @contextmanager
 def log_if_slow(task: str) -> Iterator[None]:
-    """Log what a block does, once it has taken longer than `PATIENCE_S`."""
+    """Log the task of a block if it takes longer than `PATIENCE_S`."""
     if not LOG.isEnabledFor(logging.INFO):
         yield
         return

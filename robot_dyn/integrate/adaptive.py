@@ -26,7 +26,7 @@ from robot_dyn.integrate.step_control import ControlledStepper, initial_control
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rodas5P", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
-LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
+MIN_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
 
 
 @final
@@ -39,7 +39,7 @@ class Solution:
         states: y at these times, shape (k, m).
         evaluations: Number of evaluations of the rate, including those for Jacobians and dense output.
         status: Status at the end of the run.
-        message: Description of the status in a sentence, with time and remedy if the run failed.
+        message: The status in a sentence, with time and remedy if the run failed.
     """
 
     times: np.ndarray
@@ -121,8 +121,8 @@ class Adaptive:
             "atol": number("atol", self.atol, least=0),
             "max_step_s": number("max_step_s", self.max_step_s, above=0, infinite=True),
         }
-        if not LEAST_RTOL < values["rtol"] < 1:
-            raise QueryError(f"rtol must be between {LEAST_RTOL:.3g} and 1, got {self.rtol!r}")
+        if not MIN_RTOL < values["rtol"] < 1:
+            raise QueryError(f"rtol must be between {MIN_RTOL:.3g} and 1, got {self.rtol!r}")
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -144,7 +144,7 @@ class Adaptive:
             stop: Optional function of (t, y); the run stops where it first changes sign.
 
         Returns:
-            The solution up to the end of the run. If the run fails, it has the steps until then, and status FAILED.
+            The solution up to the end of the run. If the run fails, it contains the steps before, with status FAILED.
 
         Raises:
             QueryError: If y0, t0 or t1 is not valid, or the method is auto.

@@ -13,7 +13,7 @@ from robot_dyn.foundations.arithmetic import Array
 
 NONE = 2.0  # returned without a root
 _NARROW = 1e-13  # fraction of a step: an interval this narrow is not divided further
-_MAX_DEPTH = 64  # more halvings are useless in floats
+_MAX_DEPTH = 64  # in floats, further halving has no effect
 
 
 def work_array(degree: int) -> np.ndarray:

@@ -42,7 +42,7 @@ class Steps:
         t, y: Current time and state.
         evaluations: Number of evaluations of the rate so far.
         status: Status at the end of the run, after the last step.
-        message: Description of the status in a sentence, with time and remedy if the run failed.
+        message: The status in a sentence, with time and remedy if the run failed.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class Steps:
 
     def __iter__(self) -> Iterator[tuple[float, Array, StepInterpolant]]:
         stepper, t, y = self._stepper, self.t, self.y[:, None].copy()
-        self._control = copied(self._first_control)  # a second iteration begins with a first step, too
+        self._control = copied(self._first_control)  # a second iteration also starts with a first step
         failed = np.zeros(1, np.int64)
         x = States(y=y, after=np.empty_like(y), p=_NO_PARAMETERS, run_parameters=_NO_PARAMETERS, failed=failed)
         try:
@@ -129,7 +129,7 @@ class Steps:
 
     def _fail(self, reason: str) -> None:
         where = f"{reason} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
-        self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
+        self.status, self.message = Status.FAILED, f"{where}; y grows without bound, or tolerances are too tight"
 
     def _take(self, piece: StepInterpolant, t: float, y: Array) -> bool:
         """Advance to t, or to an earlier sign change of `stop`; return True if the run stops."""

@@ -3,8 +3,8 @@
     y⁺ = y + h (k₁ + Σ b_j (k_j − k₁)),   ‖e‖ = |h| ‖e₅‖² / √(‖e₅‖² + 0.01 ‖e₃‖²),   dense output of order 7
 
 Stages are stored as differences from the first, because Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. One b_j is
-rounded so that Σ b_j c_j is ½ to the last bit; free fall would otherwise gain 1e-15 of its energy in each step. Three
-further stages give the dense output where it is needed.
+rounded so that Σ b_j c_j is ½ to the last bit; free fall would otherwise gain 1e-15 of its energy in each step. Where
+dense output is needed, three more stages are computed.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5, II.6 and II.10]
 """
@@ -70,7 +70,7 @@ def coefficients() -> Coefficients:
     a[:, 0] = c  # Σ_j a_ij = c_i, so this is the weight of k₁
     b, d, e3, e5 = table.B.copy(), table.D.copy(), table.E3.copy(), table.E5.copy()
     b[0], d[:, 0], e3[0], e5[0] = 1.0, 0.0, 0.0, 0.0
-    smallest = int(np.flatnonzero(b)[np.argmin(np.abs(b[b != 0]))])  # its spacing of floats is the finest
+    smallest = int(np.flatnonzero(b)[np.argmin(np.abs(b[b != 0]))])  # with the finest spacing of floats
     b[smallest] += float(
         (Fraction(1, 2) - sum(Fraction(x) * Fraction(y) for x, y in zip(b, c, strict=False))) / Fraction(c[smallest])
     )

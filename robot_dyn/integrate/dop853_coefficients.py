@@ -1,4 +1,4 @@
-"""The coefficients of DOP853, each with the 15 to 17 digits that give the double nearest to the published number.
+"""The coefficients of DOP853, each with the 15 to 17 digits that determine the double nearest to the published number.
 
 `A` has a row for each of 16 stages, by column; row 12 holds the weights b of the step, and the last three stages serve
 the dense output. `E3` and `E5` weigh the stages in the error estimates, `D` in the dense output.

@@ -56,7 +56,7 @@ class ExplicitRungeKutta(PlainMethod):
 
     def __post_init__(self) -> None:
         if not self.tableau.explicit or float(self.tableau.c[0]) != 0:
-            raise QueryError(f"{self.name}: row i of the tableau of an explicit method may have up to i entries")
+            raise QueryError(f"{self.name}: row i of an explicit method's tableau, from 0, may have up to i entries")
         object.__setattr__(self, "order", self.tableau.order)
         object.__setattr__(self, "evaluations_per_step", len(self.tableau.b))
 
@@ -107,7 +107,7 @@ class SemiImplicitEuler(PlainMethod):
 
 _HALF, _THIRD, _SIXTH = Fraction(1, 2), Fraction(1, 3), Fraction(1, 6)
 
-# deck 001: q⁺ = q + v dt, v⁺ = v + a dt. Euler, 1768.
+# Euler, 1768: q⁺ = q + h v, v⁺ = v + h a
 EULER = ExplicitRungeKutta("Euler", ButcherTableau(a=((),), b=(1,), c=(0,), order=1))
 
 # Runge, 1895. HNW I, II.1, (1.4)

@@ -3,8 +3,8 @@
     k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ_i b_i k_i,    Pₛ(2 c_i − 1) = 0
 
 They preserve every quadratic invariant, and the energy of a Hamiltonian system in (q, p) up to a bounded O(h²ˢ). The
-stage iteration continues until rounding dominates: an earlier end is a systematic error, and energy drifts. [Hairer,
-Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, IV.2.1, VI.4 and VIII.6]
+stage iteration continues until rounding dominates: ending it earlier is a systematic error that makes energy drift.
+[Hairer, Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, IV.2.1, VI.4 and VIII.6]
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from robot_dyn.integrate.integrator import (
     System,
     arithmetic_like,
 )
-from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, combination, evaluate, settle
+from robot_dyn.integrate.primitives import GOING, MAX_ITERATIONS, SETTLED, combination, evaluate, settle
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients, Surd, combine
 
 _INFLATION = 1.1  # Rump's ε-inflation: more than the rounding, less than 1 / the rate of contraction
@@ -84,7 +84,7 @@ def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Scalar,
     Z[...] = tableau.zero
     work.least[...], work.stale[...], work.state[...] = np.inf, 0, GOING
     rounds, going = 0, 1
-    while going > 0 and rounds < MOST_ITERATIONS:
+    while going > 0 and rounds < MAX_ITERATIONS:
         for i in range(s):
             combination(after, y, tableau.one, tableau.a[i], Z, s)
             evaluate(f.rate, t + tableau.c[i] * h, after, x.p, x.run_parameters, work.K[0])
@@ -103,7 +103,7 @@ class GaussLegendre(PlainMethod):
     """Gauss–Legendre collocation of order 2, 4 or 6, with stages solved to rounding by fixed-point iteration.
 
     The iteration converges if h is short compared with the fastest motion: h L ‖A‖ < 1, with the Lipschitz constant L
-    of f. It may take up to MOST_ITERATIONS (100) rounds. The method is A-stable, but this iteration does not suit stiff
+    of f. It may take up to MAX_ITERATIONS (100) rounds. The method is A-stable, but this iteration does not suit stiff
     systems. In balls the step contains an exact solution of the stage equations, proven by Brouwer's theorem.
 
     Attributes:
@@ -165,7 +165,7 @@ class GaussLegendre(PlainMethod):
     def not_found(self, t: Scalar, h: Scalar) -> IntegrationError:
         return IntegrationError(
             f"{self.name}: the stages of the step {float(h)} at t = {float(t)} do not converge in "
-            f"{MOST_ITERATIONS} iterations: use a smaller step, or a method for stiff systems",
+            f"{MAX_ITERATIONS} iterations; use a smaller step, or a method for stiff systems",
             t,
         )
 
@@ -181,19 +181,19 @@ def enclose_fixed_point(update: Callable[[Array], Array], x: Array) -> Array | N
         x: Exact balls near the fixed point.
 
     Returns:
-        The enclosure; None if no box is mapped into itself within MOST_ITERATIONS.
+        The enclosure; None if no box is mapped into itself within MAX_ITERATIONS.
 
     Source: Rump, Verification methods, Acta Numerica 19, 2010, section 13.
     """
     box = update(x)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         inflated = _inflate(box)
         box = update(inflated)
         if all(outer.contains_interior(inner) for outer, inner in zip(inflated.flat, box.flat, strict=True)):
             break
     else:
         return None
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         closer = update(box)
         if not (radius(closer) < 0.9 * radius(box)).any():
             break

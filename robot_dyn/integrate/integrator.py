@@ -48,7 +48,7 @@ class System:
         rate: f(t, y), which returns a new array of the shape of y, (..., m); batch axes come first.
         n: Number of positions, 0 if y has no such parts.
         widths: Change of each entry of y over which the rate bends, (m,), positive, inf where it does not bend; None
-            if unknown. Difference quotients need smaller changes.
+            if unknown. Differences must use smaller changes.
         exact: Function of t and y (..., m) that returns ∂f/∂y_j for each j and then ∂f/∂t in a new array
             (m + 1, ..., m); None for differences.
     """
@@ -126,7 +126,7 @@ class Latest(NamedTuple):
 
 
 class Integrator(ABC):
-    """A method for a single step of fixed size. It is a value without state, so runs can share it.
+    """A method for a single step of fixed size. It has no state, so runs can share it.
 
     Attributes:
         name: Name of the method, as in scene files.
@@ -253,15 +253,15 @@ class PlainMethod(Integrator):
 
 
 def arithmetic_like(y: Array) -> Arithmetic:
-    """Return the arithmetic of an array: that of its float dtype, or balls if it holds objects.
+    """Return the arithmetic of an array: that of its float dtype, or balls if its entries are objects.
 
     Raises:
-        QueryError: If it holds other numbers, such as integers.
+        QueryError: If its entries are other numbers, such as integers.
     """
     if y.dtype == object:
         return _BALL
     if y.dtype not in _FLOATS:
         raise QueryError(
-            f"y must hold float32, float64, longdouble or balls, got {y.dtype}: convert it, as y.astype(float)"
+            f"y must consist of float32, float64, longdouble or balls, got {y.dtype}; convert it by y.astype(float)"
         )
     return _FLOATS[y.dtype]

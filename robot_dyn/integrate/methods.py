@@ -62,6 +62,6 @@ def as_method(value: object) -> Integrator | Adaptive:
         return method(value)
     if not isinstance(value, Integrator | Adaptive):
         raise QueryError(
-            f"method: give a name, such as 'RK4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(value)}"
+            f"method: got {shown(value)}; give a name, such as 'RK4' or 'DOP853', or an rd.integrate.Adaptive(…)"
         )
     return value

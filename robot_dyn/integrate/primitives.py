@@ -2,7 +2,7 @@
 
     x = y + h Σ_j w_j K_j
 
-This file has the NumPy versions, in any arithmetic (elimination in floats only); `compiled.primitives` has the machine
+This file has the NumPy versions, in any arithmetic (elimination in floats only); `codegen.primitives` has the machine
 code. All other code of steps and loops exists once. A state is (m, W): entries of one run, or of W runs in lock step.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array, Scalar, midpoint
 
-MOST_ITERATIONS = 100  # enough for float64 if two rounds gain a binary digit
+MAX_ITERATIONS = 100  # enough for float64 if every two rounds gain a binary digit
 PATIENCE = 2  # rounds: with q' = v and v' = −k q, increments shrink only in every second one
 NOISE = 1e3  # rounding errors of the largest entry that may remain in an increment, for example where forces cancel
 GOING, SETTLED, LOST = 1, 0, 2  # state of an iteration: not ended; at rounding; overflowed

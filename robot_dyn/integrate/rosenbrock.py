@@ -172,7 +172,7 @@ class Rosenbrock(PlainMethod):
 
     def not_found(self, t: Scalar, h: Scalar) -> IntegrationError:
         return IntegrationError(
-            f"{self.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: use a smaller step", t
+            f"{self.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}; use a smaller step", t
         )
 
 

@@ -19,7 +19,7 @@ from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
 
 _BETA_ORDER = 0.2  # β times the order of the error: the weight of the previous error in the next step
-_SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # safety factor, and limits of the factor of a new step
+_SAFETY, _MIN, _MAX = 0.9, 0.2, 10.0  # safety factor, and limits of the factor of a new step
 _NOT_FINITE = 0.1  # factor of a step whose error is not finite
 _STRETCH = 1.01  # a step is stretched to the end, to avoid a tiny last step
 _SPACINGS = 4  # shortest step, in spacings of floats at t
@@ -34,7 +34,6 @@ class StepControl(NamedTuple):
         h: The latest step, with its sign.
         end: End of the latest step.
         error: ‖e₋‖, limited from below.
-        rejected: Number of rejected steps.
         mesh_index: Index of the next time of the mesh.
         mesh: Times at which steps must end, (k,); error control may add others. (0,) for none.
         rtol, atol: Tolerances, both 0 if only the mesh determines the steps.
@@ -46,7 +45,6 @@ class StepControl(NamedTuple):
     h: Array
     end: Array
     error: Array
-    rejected: Array
     mesh_index: Array
     mesh: Array
     rtol: float
@@ -99,15 +97,13 @@ def initial_control(
 ) -> StepControl:
     """Return the state of step control before the first step; see `StepControl` for the arguments."""
     next_h, h, end, error = np.zeros((4, 1))
-    rejected, mesh_index = np.zeros((2, 1), np.int64)
     error[0] = 1e-4
     return StepControl(
         next_h=next_h,
         h=h,
         end=end,
         error=error,
-        rejected=rejected,
-        mesh_index=mesh_index,
+        mesh_index=np.zeros(1, np.int64),
         mesh=mesh,
         rtol=float(rtol),
         atol=float(atol),
@@ -164,8 +160,7 @@ def controls_error(control: StepControl) -> bool:
 
 def shortened(control: StepControl, h: float, e: float) -> float:
     """Return the length of the next trial after a step of length h is rejected with the error e."""
-    control.rejected[0] += 1
-    return abs(h) * (max(_LEAST, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
+    return abs(h) * (max(_MIN, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
 
 
 def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected: bool) -> None:
@@ -175,9 +170,9 @@ def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected:
     """
     alpha = control.exponent
     beta = _BETA_ORDER * alpha
-    factor = _MOST
+    factor = _MAX
     if e > 0.0:
-        factor = min(_MOST, max(_LEAST, _SAFETY * e ** (0.75 * beta - alpha) * control.error[0] ** beta))
+        factor = min(_MAX, max(_MIN, _SAFETY * e ** (0.75 * beta - alpha) * control.error[0] ** beta))
     next_h = h * (min(1.0, factor) if rejected else factor)
     control.next_h[0] = max(next_h, control.next_h[0]) if reaches_end and not rejected else next_h
     control.error[0] = max(e, 1e-4)

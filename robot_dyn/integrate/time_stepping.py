@@ -4,7 +4,7 @@
     q⁺ = q_m + h/2 v⁺
 
 The impulses solve a convex problem in v⁺. Events within a step are neither located nor counted, and the order is 1.
-Without set-valued effects it is the position form of the Störmer–Verlet method, with forces that may depend on v.
+Without set-valued effects it is the position form of the Störmer–Verlet method, extended to forces that depend on v.
 [Moreau 1988; Jean, The non-smooth contact dynamics method, 1999; Acary, Brogliato, Numerical Methods for Nonsmooth
 Dynamical Systems, 2008, §10.1]
 """

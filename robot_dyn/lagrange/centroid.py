@@ -1,4 +1,4 @@
-"""Centre of mass of the moving bodies, and momentum about it: 𝓜 J of each body, in base axes.
+"""Centre of mass of the moving bodies, and momentum about it, from 𝓜 J of each body, in base axes.
 
 c = Σ (m p + R m c_b) / Σ m,   ∂c/∂q = Σ R (𝓜 J)_linear / Σ m,   h_G = A_G v   [Orin, Goswami, Lee 2013]
 """

@@ -36,7 +36,7 @@ class EulerLagrange:
 
     All methods accept q, v, a, Q (..., n) in the units of the coordinates, and times t (...) in [s], which are required
     if the result depends on the time. They raise QueryError for a wrong shape or a non-finite value, MissingTimeError
-    for a missing t, and OverflowedError where the energies are not finite.
+    for a missing t, and OverflowedError if the energies are not finite.
 
     Attributes:
         n: Number of coordinates.
@@ -60,12 +60,12 @@ class EulerLagrange:
         C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k
 
         Raises:
-            RobotDynError: If K is not ½ vᵀ M(q) v; b then differs from C v + N for any such C.
+            RobotDynError: If K is not ½ vᵀ M(q) v; no C of this form then satisfies b = C v + N.
 
         Source: Murray, Li, Sastry 1994, eq. 4.23.
         """
         if self.no_coriolis:
-            raise RobotDynError(f"no Coriolis matrix: {self.no_coriolis}; use bias(q, v), which is defined for every K")
+            raise RobotDynError(f"no Coriolis matrix: {self.no_coriolis}; use bias(q, v), which every K has")
         return self._evaluate("C", t, q, v, shape=(self.n, self.n))
 
     def N(self, q: ArrayLike, *, t: ArrayLike | None = None) -> np.ndarray:
@@ -120,11 +120,11 @@ class EulerLagrange:
         try:
             a = cholesky_solve(np.broadcast_to(M, (*batch, self.n, self.n)), np.broadcast_to(Q - b, (*batch, self.n)))
         except NotPositiveDefiniteError as error:
-            raise SingularError(f"q[{error.row}]", "at this state; choose other coordinates near it") from None
+            raise SingularError(f"q[{error.row}]", "at this state; use other coordinates near it") from None
         return _finite(a)
 
     def __str__(self) -> str:
-        """Return M a + b = Q and the entries that are not 0 as formulas in t, q1, …, v1, …; M is symmetric."""
+        """Return M a + b = Q with the nonzero entries as formulas in t, q1, …, v1, …; of M only the upper triangle."""
         import casadi as ca
 
         t, (q, v) = ca.SX.sym("t"), (ca.vertcat(*(ca.SX.sym(f"{x}{k + 1}") for k in range(self.n))) for x in "qv")
@@ -203,7 +203,7 @@ def traced(
     except QueryError:
         raise
     except Exception as error:
-        # the remedy is the same for any exception of a user's function, which stays attached
+        # the remedy is the same for all exceptions in a user's function; the original one stays attached
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise QueryError(
             f"{name} cannot be evaluated on CasADi symbols ({reason}); write it with casadi.sin, casadi.sqrt, … of q[i]"
@@ -216,7 +216,7 @@ def traced(
         if kernel.instruction_id(i) == ca.OP_CONST
     ]
     if not np.isfinite(constants).all():
-        # math.sin(q[0]) does not fail: Python converts the symbol to NaN
+        # math.sin(q[0]) does not raise: Python converts the symbol to NaN
         raise QueryError(f"{name} contains a constant that is not finite; use casadi.sin instead of math.sin")
     return value
 
@@ -263,6 +263,6 @@ def _batches(name: str, ours: tuple[int, ...], theirs: tuple[int, ...]) -> tuple
 def _finite(result: np.ndarray) -> np.ndarray:
     if not np.isfinite(result).all():
         raise OverflowedError(
-            "the result is not finite: the energies or their derivatives are singular at this state; choose another"
+            "the result is not finite: the energies or their derivatives are singular at this state; use another state"
         )
     return result

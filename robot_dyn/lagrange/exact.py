@@ -1,4 +1,4 @@
-"""True values of queries such as M, C, N: ball arithmetic, with more bits until the balls are narrow.
+"""True values of queries such as M, C, N, by ball arithmetic with increasing precision until the balls are narrow.
 
     radius ≤ 1e-20 · scale
 
@@ -21,17 +21,17 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
-from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.quantity import MAX_DIGITS, Quantity
 
 if TYPE_CHECKING:
     from flint import arb
     from numpy.typing import ArrayLike
 
 
-RESOLUTION = 10.0**-MOST_DIGITS
-_FIRST_BITS, _MOST_BITS = 128, 4096
+RESOLUTION = 10.0**-MAX_DIGITS
+_FIRST_BITS, _MAX_BITS = 128, 4096
 
-NOTHING = 1e-12  # in the units of the joints: smaller values are rounding errors of zero
+NEGLIGIBLE = 1e-12  # in the units of the joints: smaller values are rounding errors of zero
 
 State = Mapping[str, np.ndarray]  # q, v, a, tau
 
@@ -39,7 +39,7 @@ State = Mapping[str, np.ndarray]  # q, v, a, tau
 @final
 @dataclass(frozen=True)
 class RoundedLiterals(Arithmetic):
-    """Balls of the float64 nearest to each decimal of a file, instead of the decimal itself."""
+    """Balls that contain the float64 nearest to each decimal of a file, instead of the decimal itself."""
 
     ball: Ball
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
@@ -87,7 +87,7 @@ def entry_units(quantity: Quantity, M: np.ndarray) -> np.ndarray:
     joint without inertia is 1e-12 of the largest unit.
     """
     units = joint_units(M)
-    units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
+    units = np.maximum(units, NEGLIGIBLE * units.max(axis=-1, keepdims=True))
     batch = units.shape[:-1]
     product = np.ones(batch)
     for k, axis in enumerate(quantity.axes):
@@ -110,7 +110,7 @@ class Truth:
     Attributes:
         values: Balls, of the shape of the quantity.
         scale: Scale of errors.
-        bits: Precision that was needed.
+        bits: Precision of the balls.
     """
 
     values: Array
@@ -155,21 +155,21 @@ class Exact:
         while True:
             engine = self._engine(bits)
             try:
-                values = np.asarray(quantity.ask(engine, state), dtype=object)
+                values = np.asarray(quantity.evaluate(engine, state), dtype=object)
                 scale = self._scale(engine, quantity, state, values, typical)
-                if np.all(scale.relative(0 * midpoint(values), radius(values)) <= RESOLUTION) or bits >= _MOST_BITS:
+                if np.all(scale.relative(0 * midpoint(values), radius(values)) <= RESOLUTION) or bits >= _MAX_BITS:
                     return Truth(values, scale, bits)
             except UndecidedError:
-                if bits >= _MOST_BITS:
+                if bits >= _MAX_BITS:
                     raise
             bits *= 2
 
     def _scale(self, engine: Lagrangian, quantity: Quantity, state: State, values: Array, typical: float) -> Scale:
         if quantity.definite:
             return Scale(floored(diagonal_scale(midpoint(values))))
-        inertia = midpoint(M.ask(engine, state))
+        inertia = midpoint(M.evaluate(engine, state))
         if quantity.solves:
-            torques = (state["tau"], *(midpoint(term.ask(engine, state)) for term in (CORIOLIS_TORQUE, N)))
+            torques = (state["tau"], *(midpoint(term.evaluate(engine, state)) for term in (CORIOLIS_TORQUE, N)))
             return Scale(solved_norm(inertia, torques), inertia)
         certain = np.where(np.abs(midpoint(values)) > radius(values), midpoint(values), 0.0)
         return Scale(in_joint_units(quantity, certain, inertia, typical))

@@ -1,4 +1,4 @@
-"""CasADi expressions as formulas in text, with every intermediate result written out where it is used."""
+"""CasADi expressions as text formulas, with every intermediate result written out where it is used."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     import casadi as ca
 
-_LONGEST = 2000  # characters; longer formulas are not read
+_LONGEST = 2000  # characters; longer formulas are not printed
 _NODES = 400  # operations; the walk is recursive
 _SUM, _PRODUCT, _ATOM = range(3)
 
@@ -31,7 +31,7 @@ class _Term(NamedTuple):
 
 
 def formula(expression: ca.SX) -> str:
-    """Return a scalar in Python's notation, numbers with six digits; a note if it is too long to read."""
+    """Return a scalar in Python's notation, with six digits per number, or a note if it is too long to read."""
     import casadi as ca
 
     nodes = ca.n_nodes(expression)

@@ -130,7 +130,7 @@ def lagrangian_of_particles(
     def placed(t: Any, q: Any) -> Any:
         r = _positions(positions, t, q)
         if r.shape[0] != 3 * len(m):
-            raise QueryError(f"{len(m)} masses but {r.shape[0] // 3} positions; give one mass per particle")
+            raise QueryError(f"got {len(m)} masses but {r.shape[0] // 3} positions; give one mass per particle")
         return r
 
     return euler_lagrange(kinetic, total_potential, n)

@@ -56,13 +56,13 @@ class Lagrangian(Dynamics[Array], Parametrised):
 
     @cached_property
     def arithmetic(self) -> Arithmetic:
-        """Arithmetic of all numbers."""
+        """Number type of all computations."""
         return arithmetic_of(self.dtype)
 
     @cached_property
     @in_arithmetic
     def linkage(self) -> Linkage:
-        """Tree in numbers of the arithmetic."""
+        """The tree converted to numbers."""
         return linkage_of(tree_of(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
 
     @cached_property

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.description.couplings import Couplings, resolve
 from robot_dyn.description.inertial_parameters import ordered
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
-from robot_dyn.foundations.spatial import adjoint_inverse, hat, rotation_rpy, spatial_inertia, turned_about
+from robot_dyn.foundations.spatial import adjoint_inverse, hat, rotation_about, rotation_rpy, spatial_inertia
 from robot_dyn.lagrange.tree import Joint, Link, Tree
 
 BASE = -1  # index of the fixed body
@@ -62,7 +62,7 @@ class Body:
 
     @cached_property
     def generators(self) -> tuple[Array, Array]:
-        """Matrices â and â² of the axis, for `turned_about`."""
+        """Matrices â and â² of the axis, for `rotation_about`."""
         A = hat(self.axis)
         return A, A @ A
 
@@ -70,14 +70,14 @@ class Body:
         """Return the change of frame from the parent at the joint's coordinate q (...,)."""
         zero, one = np.zeros_like(self.axis), np.broadcast_to(np.eye(3, dtype=self.axis.dtype), (*q.shape, 3, 3))
         slide = q[..., None] * self.axis
-        motion = (turned_about(*self.generators, q), zero) if self.revolute else (one, slide)
+        motion = (rotation_about(*self.generators, q), zero) if self.revolute else (one, slide)
         origin = self.pose.p if self.revolute else self.pose.p + apply(self.pose.R, slide)
         return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion), origin)
 
-    def moved(self, q: Array) -> tuple[Array, Array]:
+    def placement(self, q: Array) -> tuple[Array, Array]:
         """Return (R, p) in the parent's frame at the joint's coordinate q (...,)."""
         if self.revolute:
-            return self.pose.R @ turned_about(*self.generators, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
+            return self.pose.R @ rotation_about(*self.generators, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
         slide = self.pose.R @ self.axis
         return np.broadcast_to(self.pose.R, (*q.shape, 3, 3)), self.pose.p + q[..., None] * slide
 
@@ -97,7 +97,7 @@ class Step:
     joint: Array
     origin: Array
 
-    def turned(self, x: Array) -> Array:
+    def rotated(self, x: Array) -> Array:
         """Convert a vector from the parent's axes to the body's: Rᵀ x."""
         return apply(self.joint[..., 3:, 3:], apply(self.pose[3:, 3:], x))
 
@@ -164,7 +164,7 @@ class Linkage:
 
     def _at(self, q: Array, indices: Iterable[int]) -> Configuration:
         q = self.couplings.position(q)
-        return Configuration(self, q.shape[:-1], {i: self.bodies[i].moved(q[..., i]) for i in indices})
+        return Configuration(self, q.shape[:-1], {i: self.bodies[i].placement(q[..., i]) for i in indices})
 
 
 @final
@@ -227,7 +227,7 @@ def linkage_of(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic)
             )
             source, ratio, offset = sources[joint.name]
             if source in locked:
-                pose = Pose(*body.moved(np.asarray(ratio * locked[source] + offset, dtype=arithmetic.dtype)))
+                pose = Pose(*body.placement(np.asarray(ratio * locked[source] + offset, dtype=arithmetic.dtype)))
             else:
                 bodies.append(body)
                 parent, pose = len(bodies) - 1, identity

@@ -2,8 +2,8 @@
 
 The rounding error of an entry is proportional to its terms, not to their sum. Magnitudes are therefore the scale on
 which two implementations must agree, and u times a magnitude is the size of a rounding error. A term is bounded by the
-lengths of its vectors: in body b the column of joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from
-i to b. Links fixed to each other are separate terms: if they balance, rounding leaves some of m c.
+lengths of its vectors: in body b, the column of joint i has an angular part aᵢ ≤ 1 and a linear part lᵢ, at most the
+lever from i to b. Links fixed to each other are separate terms, because rounding leaves some of m c if they balance.
 
     ‖Jᵢᵀ 𝓜 Jⱼ‖ ≤ m lᵢ lⱼ + m c (lᵢ aⱼ + aᵢ lⱼ) + I aᵢ aⱼ       ‖[Jⱼ, J_k]‖: l = aⱼ l_k + lⱼ a_k, a = aⱼ a_k
 """
@@ -35,7 +35,7 @@ class Magnitudes:
         M: Terms of M, (n, n).
         dM: Terms of ∂M_ij/∂q_k, (n, n, n).
         N: Terms of N, (n,).
-        carried: Terms of m ∂c/∂q for the centre of mass c, each of its rows, (n,): N in unit gravity.
+        carried: Terms of each row of m ∂c/∂q for the centre of mass c, (n,); equal to N in unit gravity.
         moment: Terms of m c, a number.
         V: Terms of the potential energy, a number.
         lever: Length of the linear part of each column of each link's Jacobian, by name, (n,).
@@ -71,7 +71,7 @@ class Magnitudes:
         return sum(abs(float(inertia[0, 0])) for inertia in self.linkage.inertias)
 
     def derivatives(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Return the terms of ∂τ/∂q, ∂τ/∂v, ∂τ/∂a, (3, n, n); all joints count as joints before."""
+        """Return the terms of ∂τ/∂q, ∂τ/∂v, ∂τ/∂a, (3, n, n); every joint counts as preceding the others."""
         couplings, N = _absolute(self.linkage.couplings), len(self.linkage.bodies)
         full_v, full_a = couplings.velocity(np.abs(v)), couplings.velocity(np.abs(a))
         by_q, fall = np.zeros((N, N)), np.array([float(np.linalg.norm(self.linkage.gravity)), 0.0])
@@ -88,7 +88,7 @@ class Magnitudes:
         return np.stack([couplings.matrix(by_q), 2 * self.C(v), self.M])
 
     def carried_rate(self, v: np.ndarray) -> np.ndarray:
-        """Return the terms of m d/dt ∂c/∂q, each of its rows, (n,)."""
+        """Return the terms of each row of m d/dt ∂c/∂q, (n,)."""
         couplings = _absolute(self.linkage.couplings)
         v, rate = couplings.velocity(np.abs(v)), np.zeros(len(self.linkage.bodies))
         for body, block, J in zip(self.linkage.bodies, _blocks(self.linkage), self.columns, strict=True):

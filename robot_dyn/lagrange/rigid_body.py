@@ -3,7 +3,7 @@
     world axes   m p̈ = f,             I_s ω̇ + ω × I_s ω = τ,   I_s = R I Rᵀ
     body axes    m v̇ + ω × m v = f,   I ω̇ + ω × I ω = τ
 
-p is the centre of mass, where the wrench (f, τ) acts; the body's frame has its origin there and is turned by R. The
+p is the centre of mass, where the wrench (f, τ) acts; the body's frame has its origin there and is rotated by R. The
 twist is (ṗ, ω) in world axes and (v, ω) = (Rᵀ ṗ, Rᵀ ω_s) in body axes. The world-axes twist is not the spatial twist
 ġg⁻¹ of the frame, whose linear part is ṗ + p × ω. Arrays are float64 and may have leading batch axes.
 [Murray, Li, Sastry 1994, ch. 4 §2.4]
@@ -170,8 +170,8 @@ def _solve(body: MassProperties, torque: np.ndarray) -> np.ndarray:
         return cholesky_solve(np.broadcast_to(body.inertia, (*torque.shape[:-1], 3, 3)), torque)
     except NotPositiveDefiniteError:
         raise QueryError(
-            "no angular acceleration: the inertia is singular, like that of points on a line; use a"
-            " positive definite inertia"
+            "no angular acceleration: the inertia is singular, like that of points on a line; give a positive definite"
+            " inertia"
         ) from None
 
 

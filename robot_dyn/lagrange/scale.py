@@ -1,4 +1,4 @@
-"""Comparison scales: divisors for the difference of two values of a quantity, and tolerances on the result.
+"""Comparison scales: divisors for the difference of two values of a quantity, and tolerances for the ratio.
 
     |x − y| ≤ tolerance · (Σ of the absolute values of the terms summed in x)
 
@@ -26,8 +26,8 @@ def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def floored(scale: np.ndarray) -> np.ndarray:
     """Return the scale of each entry, (n,), (m, n) or a number.
 
-    An entry without terms uses the largest in its row and column, because it contains only rounding
-    errors of its neighbours.
+    An entry without terms uses the largest scale in its row and column, because it contains only rounding errors of
+    its neighbours.
     """
     if scale.ndim != 2:
         return np.where(scale == 0, np.max(scale, initial=0.0), scale)
@@ -43,7 +43,7 @@ def diagonal_scale(M: np.ndarray) -> np.ndarray:
 
 
 def joint_units(M: np.ndarray) -> np.ndarray:
-    """Return D = √M_ii of matrices (..., n, n), which makes large and small joints comparable, (..., n)."""
+    """Return D = √M_ii, (..., n), of matrices (..., n, n); it makes large and small joints comparable."""
     return np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
 
 
@@ -69,7 +69,7 @@ def solved_tolerance(least: float, M: np.ndarray, dtype: str = "float64") -> flo
 
 
 def solved_norm(M: np.ndarray, torques: Iterable[np.ndarray]) -> np.ndarray:
-    """Return Σ ‖M⁻¹ τ_k‖_M of torques (..., n)."""
+    """Return Σ ‖M⁻¹ τ_k‖_M over torques τ_k, (..., n) each."""
     return np.sum([mass_norm(M, np.linalg.solve(M, torque[..., None])[..., 0]) for torque in torques], axis=0)
 
 

@@ -1,4 +1,4 @@
-"""Summands of M, ∂M/∂q, C and N: the terms of one rigid body, in the entries of the joints that carry it.
+"""Summands of M, ∂M/∂q, C and N: the contribution of one rigid body, in the entries of the joints that carry it.
 
     M = Σ Jᵀ 𝓜 J,   ∂M/∂q = Σ ∂(Jᵀ 𝓜 J)/∂q,   C of their Christoffel symbols,   N = −Σ Jᵀ 𝓜 (Rᵀ g, 0)
 

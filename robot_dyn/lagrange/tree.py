@@ -1,7 +1,7 @@
-"""The Tree: joints and links as stated by the file, in literals, for the library's own implementation.
+"""The Tree: joints and links of the file, with numbers as literals, for the library's own implementation.
 
-Numbers remain the decimal literals of the file, so that each arithmetic converts them itself. No code is shared with
-Pinocchio or its URDF parser; `cross_check.second_reading` compares the checked description with the original file.
+Each arithmetic converts the decimal literals of the file itself. No code is shared with Pinocchio or its URDF parser;
+`cross_check.second_reading` compares the checked description with the original file.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _ZERO: Triple = ("0", "0", "0")
 @final
 @dataclass(frozen=True)
 class Inertial:
-    """A rigid body fixed to a link: mass [kg], centre of mass [m], inertia about it [kg m²] in axes turned by rpy.
+    """A rigid body fixed to a link: mass [kg], centre of mass [m], inertia about it [kg m²] in axes rotated by rpy.
 
     `moments` are Ixx, Ixy, Ixz, Iyy, Iyz, Izz; mass and moments are multiplied by `scale`.
     """
@@ -71,7 +71,7 @@ class Joint:
 
     Attributes:
         kind: "revolute", "continuous", "prismatic" or "fixed".
-        mimic: Coupling to the joint it follows, or None.
+        mimic: Coupling to the joint that it follows, or None.
         locked: Value at which it is locked, or None.
         armature: Armature in [kg m²] or [kg].
     """

@@ -1,7 +1,7 @@
 """The thin layer over Pinocchio: `Robot` computes M, C, N, inverse and forward dynamics by CRBA, RNEA and ABA.
 
 robot: the class · calls: Pinocchio's function for each query
-loading: `load` · from_pinocchio: robots from a `pinocchio.Model`
+loading: `load` · reading: files · from_pinocchio: robots from a `pinocchio.Model`
 pinocchio_model: builds the model
 newton_euler: wrenches through moving and fixed joints
 evaluation: checks, batches and mimic joints around a call

@@ -53,7 +53,7 @@ def _kinetic_energy(built: Built) -> Call:
 
 
 def _regressor(built: Built) -> Call:
-    """Return the regressor with bodies in the order of their parameters; Pinocchio's is flat for one joint."""
+    """Return the regressor, with bodies in the order of their parameters. Pinocchio returns it flat for one joint."""
     model, names = built.model, list(built.model.names[1:])
     N, order = model.nv, [names.index(name) for name in built.body_names]
 

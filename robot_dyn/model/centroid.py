@@ -2,7 +2,7 @@
 
     ∂c/∂q = Σ R_b (𝓜_b J_b)_linear / m,   A_G = Σ (R_b f_b, R_b m_b + (p_b − c) × R_b f_b),   (f_b, m_b) = 𝓜_b J_b
 
-Pinocchio's own functions add moments about the origin of the base: small links lose digits on long arms.
+Pinocchio's own functions sum moments about the origin of the base, so that small links of long arms lose digits.
 [Orin, Goswami, Lee 2013]
 """
 
@@ -28,7 +28,7 @@ class Centroid:
     Attributes:
         bodies: Bodies, each in its body axes.
         model: The `pinocchio.Model`.
-        near_base: The model with the first joint at the origin: positions relative to it keep all digits.
+        near_base: The model with the first joint at the origin, so that positions keep all digits.
         mass: Mass of the moving bodies, in [kg].
     """
 
@@ -46,7 +46,7 @@ class Centroid:
         """
         mass = float(bodies.inertia[:, 0, 0].sum())
         if mass <= 0:
-            raise QueryError("the links that move have no mass, so there is no centre of mass; give them masses")
+            raise QueryError("no centre of mass: the moving links have no mass; give them masses")
         near_base = model.copy()
         first = model.jointPlacements[1].translation.copy()
         for j, parent in enumerate(model.parents):

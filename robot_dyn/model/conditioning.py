@@ -18,11 +18,11 @@ import numpy as np
 from robot_dyn.foundations.errors import SingularError, UndecidedError
 from robot_dyn.queries.dynamics import acceleration
 
-LEAST_DIGITS = 8  # digits of forward dynamics; with fewer, M counts as nearly singular
+MIN_DIGITS = 8  # M counts as nearly singular if forward dynamics has fewer digits
 
 
 class NearlySingular(NamedTuple):
-    """A matrix M that leaves forward dynamics fewer than LEAST_DIGITS.
+    """Facts about an M with which forward dynamics has fewer digits than MIN_DIGITS.
 
     Attributes:
         condition: Condition number κ.
@@ -39,8 +39,8 @@ class Regularity(NamedTuple):
     """Result of the check that M can be inverted.
 
     Attributes:
-        singular: Function that returns the error to raise if M is singular at every q, or if that cannot be decided in
-            float64; otherwise None.
+        singular: If M is singular at every q, or if float64 cannot decide it: function that returns the error to raise;
+            otherwise None.
         near: Loss of digits if M is nearly singular, otherwise None.
     """
 
@@ -72,6 +72,6 @@ def _nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingu
     u = np.finfo(float).eps / 2
     condition = float(eigenvalues[-1] / max(eigenvalues[0], u * eigenvalues[-1]))
     digits = float(-np.log10(u * condition))
-    if digits >= LEAST_DIGITS:
+    if digits >= MIN_DIGITS:
         return None
     return NearlySingular(condition, max(digits, 0.0), joint_names[int(np.argmax(np.abs(vectors[:, 0])))])

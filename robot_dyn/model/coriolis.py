@@ -10,8 +10,8 @@ In the body's axes ∂ṙ/∂v = (1, −r̂) J and d/dt adds ω̂, so that
 
 a skew matrix: Ṁ = C + Cᵀ. [The factorisation of Echeandia, Wensing 2021, in the axes of each body]
 
-The only distances here are those from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in world
-axes; it is used where a bound on its rounding error is small (`regrouped`).
+The only distances in it are those from a joint to the bodies it moves. Pinocchio's own Coriolis matrix is computed in
+world axes; it is used where a bound on its rounding error is small (`regrouped`).
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from robot_dyn.model.regrouped import regrouped, rounding, slides
 # ad_X is linear in X: its 36 entries, (6, 36)
 _AD = bracket(np.eye(6)).reshape(6, 36)
 
-MOST_ROUNDING = 1e-13  # ε of C in the axes of the world, in the units √M_ii of the joints
+MAX_ROUNDING = 1e-13  # largest ε for which C is computed in world axes, in the units √M_ii of the joints
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Coriolis:
-    """C of all joints of a model, by Pinocchio where its rounding error is below 1e-13, otherwise by `Bodies`.
+    """C of all joints of a model, by Pinocchio if its rounding error is at most 1e-13, otherwise by `Bodies`.
 
     Attributes:
         bodies: Bodies of the model, each in its body axes.
-        regrouped: Model from which Pinocchio computes C; None if the bound is larger.
+        regrouped: Model from which Pinocchio computes C; None if the bound is larger than 1e-13.
         slides: Index and largest |q| of each prismatic joint for which the bound holds.
         rounding: Bound ε in |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
     """
@@ -52,11 +52,11 @@ class Coriolis:
 
     @classmethod
     def from_model(cls, model: pin.Model, couplings: Couplings) -> Coriolis:
-        """Return the Coriolis matrix of a model with these couplings."""
+        """Choose the computation of C for a model with these couplings."""
         with np.errstate(all="ignore"):  # overflowing masses give a NaN bound, which fails the test below
             near_base = regrouped(model)
             bound = rounding(model, near_base, couplings)
-        return cls(Bodies.from_model(model), near_base if bound <= MOST_ROUNDING else None, slides(model), bound)
+        return cls(Bodies.from_model(model), near_base if bound <= MAX_ROUNDING else None, slides(model), bound)
 
     def matrix(self, data: pin.Data, q: ndarray, v: ndarray) -> ndarray:
         """Return C of the Christoffel symbols at one state, (N, N)."""

@@ -41,7 +41,7 @@ class Evaluation:
 
     @cached_property
     def regularity(self) -> Regularity:
-        """Regularity of M, judged at a configuration without symmetries."""
+        """Regularity of M, checked at a configuration without symmetries."""
         names = self.built.joint_names
         return regularity(self._batched("M")(np.linspace(0.3, 0.9, len(names))), names)
 
@@ -72,13 +72,13 @@ class Evaluation:
         return OnFirstUse(lambda query: PINOCCHIO[query[0]](self.built, *query[1:]))
 
     def answer(self, name: str, state: tuple[Any, ...], nan: bool, *frame: str) -> Any:
-        """Return the result of a query at one state or a batch; with `nan`, NaN at states without one."""
+        """Return the result of a query at one state or a batch; with `nan`, NaN for states without a result."""
         if QUANTITIES[name].solves:
             return self._forward_dynamics(state, nan)
         return self._answered(name, state, nan, self._batched(name, *frame))
 
     def _solved(self, data: pin.Data, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
-        """Return forward dynamics at one state; on the fast path if joints are coupled and M is regular."""
+        """Return forward dynamics at one state; by a shorter path if joints are coupled and M is regular."""
         built, couplings = self.built, self.built.couplings
         if self.regularity.singular is None and not couplings.trivial:
             M = self.one_state["M"](data, q)
@@ -107,7 +107,7 @@ class Evaluation:
         """Return a query as a function (q, …) of arrays (..., n), which evaluates one state after another."""
         try:
             call = self._calls[name, *frame]
-        except TypeError:  # an unhashable frame, which the call refuses
+        except TypeError:  # an unhashable frame: the call raises the proper error
             call = PINOCCHIO[name](self.built, *frame)
         couplings, data = self.built.couplings, self.scratch.data
         axes = QUANTITIES[name].axes

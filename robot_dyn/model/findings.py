@@ -1,7 +1,7 @@
-"""Findings about a valid robot description: each doubtful item and its remedy, in one sentence.
+"""Findings: doubtful values in a valid robot description, each with its remedy in one sentence.
 
-`urdf.py` refuses meaningless files; a finding reports valid but probably unintended values. Criteria and
-reasons are in docs/reference/findings.md. Each function yields the findings of one kind.
+`urdf.py` refuses meaningless files; findings report valid but probably unintended values. docs/reference/findings.md
+lists criteria and reasons. Each function yields the findings of one kind.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from robot_dyn.description.other_programs import ARMATURE, STIFFNESS, of_coordin
 from robot_dyn.description.structure import StatedLink, Structure, stands_on, structure_of
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
-from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
+from robot_dyn.model.conditioning import MIN_DIGITS, NearlySingular, Regularity
 
-LONGEST = 1e4  # [m], also for a mimic's multiplier: sums with such a length have rounding errors of 1e-12 m
+LONGEST = 1e4  # [m]; also for multipliers of mimic joints: sums with such a length have rounding errors of 1e-12 m
 LIGHTEST = 1e-12  # [kg]
-_OTHER_PROGRAMS = b"otorInertia", b"rotor_inertia", b"tiffness"  # parts of all elements that `for_other_programs` reads
+_OTHER_PROGRAMS = b"otorInertia", b"rotor_inertia", b"tiffness"  # one occurs in any element `for_other_programs` reads
 _LISTED = 6  # maximum number of names in a finding
 
 
 def findings_of(description: Description, edits: Edits, regularity: Regularity) -> tuple[str, ...]:
-    """Return findings about a description, then about the robot with its edits: location, problem and remedy."""
+    """Return the findings about a description and about the robot with its edits: location, problem and remedy."""
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach,
         centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_efforts, zero_speeds, equal_limits,
@@ -41,11 +41,11 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
     of_kinds = (finding for kind in kinds for finding in kind(robot))
     joint = None if regularity.near else regularity.joint
     singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)
-    return (*reservations(description), *singular, *of_kinds, *near, *for_other_programs(robot, description))
+    return (*reading_findings(description), *singular, *of_kinds, *near, *for_other_programs(robot, description))
 
 
-def reservations(description: Description) -> tuple[str, ...]:
-    """Return findings on estimated inertias, and on assumptions and omissions when the file was read."""
+def reading_findings(description: Description) -> tuple[str, ...]:
+    """Return findings on estimated inertias, and on assumptions and omissions made while reading the file."""
     return (*estimated_links(description), *description.findings)
 
 
@@ -53,8 +53,8 @@ def estimated_links(description: Description) -> Iterator[str]:
     """Report links whose inertia was estimated from shapes."""
     if names := [*description.estimated]:
         yield (
-            f"{_named('link', names)}: mass or inertia is estimated from shapes, not measured; torques are rough;"
-            " replace the estimates by measured values where you have them"
+            f"{_named('link', names)}: mass or inertia is estimated from shapes, so torques are rough; replace the"
+            " estimates by measured values where you have them"
         )
 
 
@@ -120,7 +120,7 @@ def centres_beyond_reach(robot: Structure) -> Iterator[str]:
 
 def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
     """Report a joint whose bodies have mass only on its axis, so that M is singular."""
-    # next to a massless body the axes of two joints may coincide; that body is then the cause
+    # a massless body may join two coincident axes; it is then reported as the cause instead
     if joint is not None and all(_has_mass(robot, other) for other in robot.bodies):
         yield (
             f"joint {joint!r}: the bodies it moves have mass but no inertia about its axis, so M is singular; add"
@@ -129,17 +129,17 @@ def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
 
 
 def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
-    """Report a mass matrix so close to singular that rounding destroys most digits of forward dynamics."""
+    """Report a mass matrix so nearly singular that rounding destroys most digits of forward dynamics."""
     if near is not None:
         yield (
             f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so forward dynamics may have only"
             f" {near.digits:.0f} correct digits; correct the inertia it moves, or add armature (queries warn below"
-            f" {LEAST_DIGITS} digits; rd.accuracy.warn_below(robot, None) turns this off)"
+            f" {MIN_DIGITS} digits; rd.accuracy.warn_below(robot, None) turns this off)"
         )
 
 
 def tiny_masses(robot: Structure) -> Iterator[str]:
-    """Report links with a nonzero mass smaller than that of any part of an arm."""
+    """Report links with a positive mass too small for any part of an arm."""
     for name, link in robot.links.items():
         if 0 < link.mass < LIGHTEST:
             yield f"link {name!r}: its mass of {link.mass:g} kg is below {LIGHTEST:g} kg; correct it or its unit"
@@ -178,8 +178,8 @@ def zero_speeds(robot: Structure) -> Iterator[str]:
 def _zero_limits(robot: Structure, limit: str, unit: str) -> Iterator[str]:
     if names := [name for name in robot.free if getattr(robot.joints[name], limit) == 0]:
         yield (
-            f"{_joints(names)}: the {limit} limit is 0, which allows no {limit} at all; give the limit in {unit},"
-            f" or remove {limit} if there is none"
+            f"{_joints(names)}: the {limit} limit is 0, which allows no {limit}; give the limit in {unit}, or remove"
+            " the attribute"
         )
 
 
@@ -196,7 +196,7 @@ def followers_beyond_limits(robot: Structure) -> Iterator[str]:
             for name, (low, high) in limit.exceeded.items():
                 yield (
                     f"joint {name!r}: follows {source!r} beyond its own {kind} limits, [{low:g}, {high:g}], which are"
-                    f" not enforced, because {source!r} would keep hardly any range; correct its <limit> or <mimic>"
+                    f" not enforced: they would leave {source!r} hardly any range; correct its <limit> or <mimic>"
                 )
 
 
@@ -209,7 +209,7 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
         name: x[ARMATURE] for name, x in stated.items() if x.get(ARMATURE) and name not in dict(robot.edits.armature)
     }
     stiffness = {name: x[STIFFNESS] for name, x in stated.items() if x.get(STIFFNESS)}
-    for numbers, what, units, remedy in (
+    for numbers, quantity, units, remedy in (
         (
             armature,
             "a reflected rotor inertia of {}, which M does not contain",
@@ -218,7 +218,7 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
         ),
         (
             stiffness,
-            "a spring of {}, which does not act",
+            "a spring of {}, which has no effect",
             ("N m/rad", "N/m"),
             'the effect Spring("urdf", rest="urdf") adds it',
         ),
@@ -229,7 +229,7 @@ def for_other_programs(robot: Structure, description: Description) -> Iterator[s
                 by_unit.setdefault(units[robot.joints[name].kind == "prismatic"], []).append(value)
             largest = " and ".join(f"{max(values):.3g} {unit}" for unit, values in by_unit.items())
             largest = f"{'up to ' if len(numbers) > 1 else ''}{largest}"
-            yield f"{_joints(numbers)}: the file states, for other programs only, {what.format(largest)}; {remedy}"
+            yield f"{_joints(numbers)}: the file states, for other programs only, {quantity.format(largest)}; {remedy}"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:
@@ -237,8 +237,8 @@ def welded_base(robot: Structure) -> Iterator[str]:
     if signs := stands_on(robot):
         yield (
             f"link {robot.root!r}: the base of a robot with legs, wheels or rotors"
-            f" ({', '.join(map(repr, signs[:_LISTED]))}) is fixed to the world here, because floating bases are"
-            " not supported; the results are those of the robot on a stand"
+            f" ({', '.join(map(repr, signs[:_LISTED]))}) is fixed to the world, because floating bases are not"
+            " supported; results apply to the robot on a stand"
         )
 
 

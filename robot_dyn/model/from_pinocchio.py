@@ -1,7 +1,7 @@
-"""Description and edits of a `pinocchio.Model`: it is written as a URDF, which is read like any other.
+"""Conversion of a `pinocchio.Model`: it is written as a URDF, which is read like any other.
 
-Literals are the shortest with the same float64 value, so masses, inertias, axes and positions are exact; rotations are
-converted to roll, pitch and yaw and may change in the last bits.
+Masses, inertias, axes and positions are exact: each literal is the shortest one of its float64. Rotations are converted
+to roll, pitch and yaw and may change in the last bits.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class _Writer:
         return {key: repr(float(np.clip(value, -_UNBOUNDED, _UNBOUNDED))) for key, value in bounds.items()}
 
     def symmetric(self, where: str, quantity: str, lower: float, upper: float) -> float:
-        """Return the bound of a range symmetric about 0; report any other range, for which inf is returned."""
+        """Return the bound of a range symmetric about 0; for any other range, add a finding and return inf."""
         if abs(lower) in (abs(upper), 0.0) or abs(lower) >= _UNBOUNDED:  # both signs occur; 0 and ∞ if unset
             return upper
         self.findings.append(f"{where}: its {quantity} {lower:g}, {upper:g} are not symmetric about 0 and are ignored")

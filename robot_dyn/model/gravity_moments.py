@@ -1,9 +1,9 @@
-"""An upper bound of the torque of gravity at every position: |N_i| ≤ Σ m g r over the bodies that joint i carries.
+"""An upper bound of the gravity torque at every position: |N_i| ≤ Σ m g r over the bodies that joint i carries.
 
 r is the distance of a centre of mass from the axis with the chain between them stretched: the distance of the next
 joint, or of the centre of the joint's own body, from the axis, plus the lengths of all further links and strokes. For a
-prismatic joint r is 1. Of a joint on the base, only the component of g normal to its axis counts, or along a slide. A
-coordinate with coupled joints has the sum of theirs, times their ratios.
+prismatic joint r is 1. For a joint on the base, only the component of g normal to its axis counts, or along it if it is
+prismatic. For coupled joints, the bounds are multiplied by the ratios and added.
 """
 
 from __future__ import annotations

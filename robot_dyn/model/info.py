@@ -75,16 +75,16 @@ class Info(Answer):
         total_mass: Mass of all links, in [kg].
         gravity: Acceleration of free fall in base axes, in [m/s²].
         gravity_acts: True if gravity exerts a torque on a joint at some position.
-        gravity_free: Joints on which gravity exerts no torque at any position, as the robot is mounted.
+        gravity_free: Joints on which gravity exerts no torque at any position in the robot's mounting.
         balanced: Joints on which gravity exerts no torque in any mounting.
         file_order: Independent joints in the order of the file.
         joints: Independent joints, in the order of q.
         couplings: Joints that follow another one, as stated by the file.
-        narrowed: Followers that reach their own limits before their joint reaches its own, by joint: they narrow
+        narrowed: By joint: followers that reach their limits before the joint reaches its own, and therefore narrow
             its `lower`, `upper` or `velocity_limit`.
         locked: Value of each locked joint, in [rad] or [m].
-        payloads: Payloads that were added.
-        estimated: Basis of each inertia that is estimated, not measured, by link.
+        payloads: Payloads added to the robot.
+        estimated: Basis of each estimated inertia, by link.
         links: Names of the frames.
         other_programs: Rotors, springs and soft limits that the file states for other programs, see
             `Robot.statements`.
@@ -156,7 +156,7 @@ def _other_edits(edits: Edits) -> Iterator[str]:
 
 
 def couplings_of(description: Description, moving: Collection[str]) -> Iterator[Coupling]:
-    """Return the couplings of moving joints, as stated by the file."""
+    """Yield the couplings of moving joints, as stated by the file."""
     for joint in description.element.iterfind("joint[mimic]"):
         mimic: Any = joint.find("mimic")
         if joint.get("name") in moving:
@@ -165,7 +165,7 @@ def couplings_of(description: Description, moving: Collection[str]) -> Iterator[
 
 
 def narrowed(robot: Structure) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Return each joint whose limits are narrowed by its followers, with their names."""
+    """Yield each joint whose limits are narrowed by followers, with the names of the followers."""
     speeds = speed_limits(robot)
     for joint, position in position_limits(robot).items():
         if names := (*position.narrowed_by, *speeds[joint].narrowed_by):

@@ -1,21 +1,12 @@
-"""Loading: maps a name or path to a Robot in standard gravity."""
+"""Loading of robots by name or path, in standard gravity."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from robot_dyn.description import catalog
-from robot_dyn.description.description import Description, check, read
-from robot_dyn.description.packages import searched
-from robot_dyn.description.sources import mjcf, robot_descriptions
-from robot_dyn.description.sources.mjcf import is_mjcf
-from robot_dyn.description.sources.xacro import expand
-from robot_dyn.foundations.errors import CatalogError, DescriptionError, QueryError
-from robot_dyn.foundations.validate import choice, truth
+from robot_dyn.model.reading import STATED, read_file
 from robot_dyn.model.robot import Robot
-
-STATED, FROM_SHAPES = "stated", "from_shapes"
 
 
 def load(
@@ -44,11 +35,11 @@ def load(
             links, which opens mesh files, with masses from the next three arguments. `Robot.estimated` lists these
             links; values stated by the file are not changed.
         mass: With "from_shapes": masses by link, in [kg].
-        total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; the mass not stated elsewhere is
-            shared by the volume of convex hulls.
+        total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; links without a mass share the
+            rest in proportion to the volume of their convex hulls.
         density: With "from_shapes": density in [kg/m³] of links without a mass, instead of `total_mass`.
-        allow_overlap: With "from_shapes": accept meshes whose closed parts overlap, and count the shared volume once
-            for each part; by default they are refused, because their mass is ambiguous.
+        allow_overlap: With "from_shapes": accept meshes whose closed parts overlap, and count the common volume once
+            per part; by default they are refused, because their mass is ambiguous.
         download: Allow robot_descriptions to download missing files.
         without: Elements to leave out of an MJCF file, from "tendon", "equality", "free" and "ball"; findings list
             them. MJCF, in a file with suffix .xml or .mjcf, is compiled by MuJoCo, which opens its meshes; needs
@@ -56,59 +47,18 @@ def load(
 
     Raises:
         CatalogError: If there is no such robot or file, an entry of `package_dirs` is not a folder, or a description
-            is not on disk.
+            has not been downloaded.
         MissingExtraError: If robot_descriptions is needed but not installed: pip install 'robot-dyn[robots]'.
-        DescriptionError: If the file is refused, or cannot be expanded, or the shape of a link without inertia cannot
-            be read.
-        QueryError: If an estimate needs a mass and there is none, or a given mass is not positive, already stated, or
-            of an unknown link.
+        DescriptionError: If the file is refused or cannot be expanded, or a shape needed for an estimate cannot be
+            read.
+        QueryError: If an estimate lacks a mass, or a given mass is not positive, already stated by the file, or of an
+            unknown link.
 
     Warns:
         ModelWarning: Once, if there are findings about the description; the robot is loaded anyway.
     """
-    choice("inertia", inertia, (STATED, FROM_SHAPES))
-    has_masses = any(value is not None for value in (mass, total_mass, density)) or truth(
-        "allow_overlap", allow_overlap
-    )
-    if inertia == STATED and has_masses:
-        raise QueryError(
-            f"mass, total_mass, density and allow_overlap need inertia={FROM_SHAPES!r}; add it, or remove them"
-        )
-    package_dirs, without = searched(package_dirs), mjcf.leavable(without)
-    if isinstance(name_or_path, str) and name_or_path.startswith(robot_descriptions.PREFIX):
-        described = robot_descriptions.find(name_or_path, truth("download", download))
-        path, xacro = described.path, described.expansion(xacro)
-        package_dirs = (*package_dirs, *described.package_dirs)
-    elif truth("download", download):
-        raise CatalogError("download=True needs a name such as robot_descriptions:ur10e_description; remove it")
-    else:
-        path = catalog.find(name_or_path, package_dirs)
-    if xacro is None and is_mjcf(path):
-        return _compiled(path, without, inertia)
-    if without:
-        raise DescriptionError(f"{path}: without={set(without)} applies to MJCF files only; remove it")
-    description = read(path) if xacro is None else _expanded(path, xacro, package_dirs)
-    if inertia == FROM_SHAPES:
-        from robot_dyn.shapes.estimate import with_estimates
-        from robot_dyn.shapes.masses import Masses
-
-        masses = Masses({} if mass is None else mass, total_mass, density, allow_overlap)
-        description = with_estimates(description, masses, package_dirs)
-    return Robot(description).announced()
-
-
-def _expanded(path: Path, xacro: Mapping[str, str | float | bool], package_dirs: tuple[Path, ...]) -> Description:
-    """Return the description of an expanded xacro file."""
-    text, warnings, _ = expand(path, xacro, package_dirs)
-    return check(text, source=str(path), findings=warnings)
-
-
-def _compiled(path: Path, without: frozenset[str], inertia: str) -> Robot:
-    """Return the robot of an MJCF file, whose compiler derives missing inertias from shapes by its own rules."""
-    if inertia != STATED:
-        raise QueryError(
-            "inertia='from_shapes' applies to URDF only: MuJoCo itself computes inertias missing from MJCF; remove it"
-        )
-    compiled = mjcf.read(path, without)
-    robot = Robot(check(compiled.urdf, source=str(path), findings=compiled.findings))
-    return robot.with_(**compiled.edits(robot.joint_names)).announced()
+    description, edits = read_file(
+        name_or_path, package_dirs=package_dirs, xacro=xacro, inertia=inertia, mass=mass, total_mass=total_mass,
+        density=density, allow_overlap=allow_overlap, download=download, without=without,
+    )  # fmt: skip
+    return Robot(description, edits).announced()

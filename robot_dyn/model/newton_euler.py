@@ -32,7 +32,7 @@ from robot_dyn.queries.dynamics import Dynamics
 @final
 @dataclass(frozen=True, eq=False)
 class JointWrenches(ReadOnly):
-    """Wrenches F = (f, τ) of parent links on child links, in [N] and [N m]; `wrenches[joint]` is that of one joint.
+    """Wrenches F = (f, τ) of parent links on child links, in [N] and [N m]; `wrenches[joint]` selects one joint.
 
     Attributes:
         joints: Names of the k joints of the file: moving, locked and fixed, from the base to the tips.
@@ -52,13 +52,13 @@ class JointWrenches(ReadOnly):
 @final
 @dataclass(frozen=True, eq=False)
 class NewtonEuler:
-    """The Newton–Euler recursion through k joints of a file and one more, which carries the root link.
+    """The Newton–Euler recursion through the k joints of a file and one more, which carries the root link.
 
     Attributes:
         model: The `pinocchio.Model` of these joints.
         couplings: Map from q to their positions, which are constant for fixed and locked joints.
         scratch: Working memory of the algorithm.
-        links: The link that each joint carries first; the root link first.
+        links: The child link of each joint, preceded by the root link.
         parents: Parent of each link except the root.
     """
 
@@ -124,7 +124,7 @@ def joint_wrenches(
             axes = transpose(R if frame is None else _placements(dynamics, q, (frame,))[0])
             W = np.concatenate([apply(axes, f), apply(axes, tau)], axis=-1)
         if not np.isfinite(W).all():
-            raise OverflowedError("the external wrenches are so large that the result overflows")
+            raise OverflowedError("the result overflows: the external wrenches are too large")
     return JointWrenches(tuple(recursion.model.names[2:]), W[..., 1:, :], W[..., 0, :])
 
 

@@ -30,7 +30,7 @@ _MARK = "joint:"  # prefix during building: a joint may share a link's name or b
 @final
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A Pinocchio model with the other values that its calls need.
+    """A Pinocchio model and the values that its calls need.
 
     Attributes:
         model: The `pinocchio.Model` of all moving joints.
@@ -78,12 +78,13 @@ def build(description: Description, edits: Edits) -> Built:
     if model.nv == 0:
         raise DescriptionError(
             f"{description.source}: no joint moves, so the robot has no dynamics;"
-            " make a joint revolute, continuous or prismatic, or add a rigid tool to an arm as an rd.Payload"
+            " make a joint revolute, continuous or prismatic, or attach a rigid tool to an arm by its path:"
+            " arm.attach('tool.urdf', frame='tool0')"
         )
     if model.nv > MAX_MOVING:
         raise DescriptionError(
-            f"{description.source}: {model.nv} joints move, more than the maximum of {MAX_MOVING}: the memory of"
-            " Pinocchio's algorithms grows with their cube; make some fixed or split the robot"
+            f"{description.source}: {model.nv} joints move, more than the maximum of {MAX_MOVING}: Pinocchio's working"
+            " memory grows with the cube of their number; make some fixed, or split the robot"
         )
     _apply(edits, model)
     model = _locked(model, edits, mimics)
@@ -103,8 +104,8 @@ def every_joint(description: Description, edits: Edits, joint_names: tuple[str, 
     mimics = stated_mimics(robot)
     if (count := len(robot.findall("joint"))) >= MAX_MOVING:
         raise DescriptionError(
-            f"{description.source}: wrenches need a working memory that grows with the cube of the number of joints,"
-            f" {count} with the fixed ones; merge links to have less than {MAX_MOVING}"
+            f"{description.source}: {count} joints, fixed ones included, are too many for joint wrenches: working"
+            f" memory grows with the cube of their number; merge links until there are fewer than {MAX_MOVING}"
         )
     for joint in robot.iterfind("joint[@type='fixed']"):
         joint.set("type", "revolute")
@@ -122,12 +123,12 @@ def every_joint(description: Description, edits: Edits, joint_names: tuple[str, 
 
 
 def _model(robot: etree._Element, source: str, edits: Edits, *root: Any) -> pin.Model:
-    """Return the model of a file with the edits of its links, and with marked joints; a root joint is optional."""
+    """Return the model of a file with edited links and marked joint names; a root joint is optional."""
     write_edits(robot, edits)
     for joint in robot.iterfind("joint"):
         joint.set("name", _MARK + joint.get("name"))
         if joint.get("type") == "continuous":
-            joint.set("type", "revolute")  # with limits of ±1e308: q is then one number, as is v
+            joint.set("type", "revolute")  # with limits of ±1e308, so that q is one number, like v
     try:
         return pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"), *root)
     except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
@@ -135,7 +136,7 @@ def _model(robot: etree._Element, source: str, edits: Edits, *root: Any) -> pin.
 
 
 def write_edits(robot: etree._Element, edits: Edits) -> None:
-    """Replace masses and inertias of links in the file by those of the edits, and scale both by link."""
+    """Replace masses and inertias of links in the file by edited values, and scale both by link."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     with_mass = [name for name, inertial in links.items() if inertial is not None]
     for edit in ("mass_scales", "masses", "inertias"):

@@ -7,8 +7,8 @@ base. In world axes, Pinocchio sums C_ij = Σ_b J_iᵀ (Y_b dJ_j/dt + B_b J_j), 
     T_ij Ω,   T_ij = Σ_b m_b r_ib r_jb + ‖I_b‖,   r_ib = D_i + D_b + |c_b|
 
 with D the largest distance of a joint from the origin and Ω the sum of the joint speeds. For a prismatic joint r is 1,
-‖I_b‖ does not count, and the speed is divided by the largest D. A wrist of mass m and radius r loses digits by (D/r)²;
-after its mass is moved to its parents, only by D/r. Up to a few roundings of the terms
+‖I_b‖ does not count, and the speed is divided by the largest D. A wrist of mass m and radius r loses a factor (D/r)² of
+its accuracy; after its mass is moved to its parents, only D/r. Up to a few roundings of the terms
 
     |δC_ij| ≤ ε Ω √(M_ii M_jj),   ε = u (8 N + max T_ij / √(least M_ii · least M_jj))
 """
@@ -27,7 +27,7 @@ from robot_dyn.description.urdf import UNBOUNDED
 
 
 def regrouped(model: pin.Model) -> pin.Model:
-    """Return a model with the same C whose first joints are at the origin and whose distal bodies have little mass.
+    """Return a model with the same C, with its first joints at the origin and with little mass in distal bodies.
 
     A body at reach D has its centre of mass at p + r e, with p on the joint's axis and e normal to it. It is replaced
     by a mass m r/R at p + R e with R = max(r, D), and I − m r (R − r) (1 − e eᵀ); the parent gets m − m r/R at p.

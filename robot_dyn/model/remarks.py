@@ -1,4 +1,4 @@
-"""Remarks on a robot and its states that a user may not expect: no torque of gravity, order of q, angles in degrees."""
+"""Remarks on unexpected properties of a robot or state: no gravity torque, order of q, angles in degrees."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def no_torque(gravity: tuple[float, float, float]) -> str:
 def gravity_lines(
     gravity: tuple[float, float, float], free: tuple[str, ...], balanced: tuple[str, ...], n: int
 ) -> Iterator[str]:
-    """Yield remarks if gravity exerts no torque on some joints of n at any position, `balanced` in any mounting."""
+    """Yield remarks on joints on which gravity exerts no torque at any position; on `balanced` ones in any mounting."""
     if len(free) == n:
-        yield f"{no_torque(gravity)} without effects"
+        yield f"{no_torque(gravity)} without effects{', in any mounting' if len(balanced) == n else ''}"
         return
     mounted = [name for name in free if name not in balanced]
     for names, when in ((mounted, "as the robot is mounted"), (balanced, "in any mounting")):
@@ -33,7 +33,7 @@ def gravity_lines(
 def order_lines(joints: tuple[str, ...], file_order: tuple[str, ...]) -> Iterator[str]:
     """Yield the order of q if the file has another order."""
     if joints != file_order:
-        yield f"order of q: {', '.join(joints)}; the file has {', '.join(file_order)}: give a state by joint name"
+        yield f"order of q: {', '.join(joints)}; the file lists {', '.join(file_order)}: give states by joint name"
 
 
 def short_order(joints: tuple[str, ...], file_order: tuple[str, ...]) -> Iterator[str]:
@@ -61,6 +61,6 @@ def degree_lines(
     if beyond.any() and ((degrees >= lower) & (degrees <= upper))[turns].all():
         i = int(beyond.argmax())
         yield (
-            f"q looks like degrees: {q[i]:g} rad of {joints[i]} is beyond its limits, {lower[i]:.4g} to {upper[i]:.4g},"
-            f" but {q[i]:g}° is not; angles are in rad, such as np.deg2rad(q)"
+            f"q may be in degrees: {q[i]:g} rad of {joints[i]} is beyond its limits, {lower[i]:.4g} to {upper[i]:.4g},"
+            f" but {q[i]:g}° is not; give angles in rad, for example np.deg2rad(q)"
         )

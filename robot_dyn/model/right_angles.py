@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from robot_dyn.control.controller import Controller
 
 
-# With fewer, the intended angle is a guess, and a comparison of implementations could detect the change.
-_LEAST_DECIMALS = 9
+# With fewer decimals, the intended angle would be a guess, and the change large enough to show in a cross-check.
+_MIN_DECIMALS = 9
 _FULL = 15  # decimals that need no change
 
 
@@ -47,29 +47,29 @@ class RightAngle:
         return f"joint {self.joint!r}: rpy {self.rpy} taken as right angles ({self.change:.0e} rad)"
 
 
-def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
+def with_exact_right_angles(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
     """Return the robot with exact right angles, and the changes."""
     description, changes = _written_out(robot.description)
     return (Robot(description, robot.edits) if changes else robot), changes
 
 
-def models_in_full(controller: Controller | None, full: Callable[[Robot], Robot]) -> Controller | None:
-    """Return a controller whose models are completed by `full`; the controller itself if none changes."""
+def with_exact_models(controller: Controller | None, full: Callable[[Robot], Robot]) -> Controller | None:
+    """Return a controller with each robot model replaced by `full(model)`; the same controller if none changes."""
     models = {} if controller is None else controller.models
     full_models = {name: full(model) for name, model in models.items() if isinstance(model, Robot)}
     return with_values(controller, {name: robot for name, robot in full_models.items() if robot is not models[name]})
 
 
 def robot_of(dynamics: object) -> Robot | None:
-    """Return the robot that defines a dynamics, with exact right angles; None if there is none."""
+    """Return the robot of a dynamics object, with exact right angles; None if it has no robot."""
     robot = _described(dynamics)
-    return None if robot is None else completed(robot)[0]
+    return None if robot is None else with_exact_right_angles(robot)[0]
 
 
-def written_out(*dynamics: object) -> str:
+def right_angle_note(*dynamics: object) -> str:
     """Describe the right angles that machine code of these dynamics makes exact, in one sentence, or ""."""
     robots = [robot for item in dynamics if (robot := _described(item)) is not None]
-    changes = tuple(dict.fromkeys(change for robot in robots for change in completed(robot)[1]))
+    changes = tuple(dict.fromkeys(change for robot in robots for change in with_exact_right_angles(robot)[1]))
     return _sentence(changes) if changes else ""
 
 
@@ -103,7 +103,7 @@ def _written_out(description: Description) -> tuple[Description, tuple[RightAngl
 def _completed(literal: str) -> str:
     mantissa, _, exponent = literal.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
-    if exponent or not _LEAST_DECIMALS <= decimals < _FULL:
+    if exponent or not _MIN_DECIMALS <= decimals < _FULL:
         return literal
     angle = float(literal)
     right = round(angle / (math.pi / 2)) * (math.pi / 2)

@@ -39,6 +39,7 @@ from robot_dyn.description.other_programs import (
     of_coordinates,
     statements,
 )
+from robot_dyn.description.soft_limits import within_soft_limits
 from robot_dyn.description.structure import Structure, structure_of
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import (
@@ -52,7 +53,7 @@ from robot_dyn.foundations.local_ascent import search_box
 from robot_dyn.foundations.validate import JointValues, function, instance, is_moderate, is_plain, is_state, numbers
 from robot_dyn.foundations.values import Caching, OnFirstUse
 from robot_dyn.model.calls import Scratch
-from robot_dyn.model.conditioning import LEAST_DIGITS
+from robot_dyn.model.conditioning import MIN_DIGITS
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of, zero_efforts
@@ -60,6 +61,7 @@ from robot_dyn.model.from_pinocchio import described
 from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, robot_line
 from robot_dyn.model.newton_euler import JointWrenches, NewtonEuler, joint_wrenches
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
+from robot_dyn.model.reading import read_file
 from robot_dyn.model.remarks import no_torque
 from robot_dyn.model.to_urdf import write_urdf
 from robot_dyn.queries.batch import into
@@ -159,7 +161,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             v: Velocities, shape (..., n), in [rad/s] or [m/s].
             a: Accelerations, shape (..., n), in [rad/s²] or [m/s²].
             external: Wrenches on links, (..., 6) in [N] and [N m] by link, in base axes at the link's frame; those of
-                effects do not count otherwise.
+                effects are not included automatically.
             frame: Link whose axes are used for all wrenches; None for those of each child link.
             at: Link at whose origin all torques are taken; None for the origin of each joint.
 
@@ -202,12 +204,12 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def lower(self) -> ndarray:
-        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated; those of followers count, see `info`."""
+        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated; followers may narrow them, see `info`."""
         return self._limits(position_limits, "lower")
 
     @cached_property
     def upper(self) -> ndarray:
-        """Upper position limits, (n,) in [rad] or [m]; inf if unstated; those of followers count, see `info`."""
+        """Upper position limits, (n,) in [rad] or [m]; inf if unstated; followers may narrow them, see `info`."""
         return self._limits(position_limits, "upper")
 
     @cached_property
@@ -217,7 +219,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def velocity_limit(self) -> ndarray:
-        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated; those of followers count, see `info`."""
+        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated; followers may narrow them, see `info`."""
         return self._limits(speed_limits, "upper")
 
     @cached_property
@@ -232,7 +234,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def statements(self) -> tuple[Statement, ...]:
-        """Rotors, springs and soft limits that the file states for other programs; none acts unless you ask for it."""
+        """Rotors, springs and soft limits that the file states for other programs; they have no effect by default."""
         return statements(parse(self.description.text, self.description.source)[0])
 
     @cached_property
@@ -255,12 +257,12 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def soft_lower(self) -> ndarray:
-        """Lower soft limits of <safety_controller>, (n,) in [rad] or [m]; −inf if unstated."""
+        """Lower soft limits of <safety_controller>, (n,) in [rad] or [m]; −inf if unstated; see `with_soft_limits`."""
         return self._stated(LOWER, -np.inf)
 
     @cached_property
     def soft_upper(self) -> ndarray:
-        """Upper soft limits of <safety_controller>, (n,) in [rad] or [m]; inf if unstated."""
+        """Upper soft limits of <safety_controller>, (n,) in [rad] or [m]; inf if unstated; see `with_soft_limits`."""
         return self._stated(UPPER, np.inf)
 
     @cached_property
@@ -280,7 +282,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def estimated(self) -> Mapping[str, str]:
-        """Basis of each inertia that is estimated from shapes, not measured, by link; see `load`."""
+        """Basis of each inertia estimated from shapes, by link; see `load`."""
         return MappingProxyType(self.description.estimated)
 
     @cached_property
@@ -334,7 +336,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def gravity_free(self) -> tuple[str, ...]:
-        """Joints on which gravity exerts no torque or force at any position, as mounted: such as a vertical axis."""
+        """Joints on which gravity exerts no torque or force at any position, for example about a vertical axis."""
         g = float(np.linalg.norm(self.edits.gravity))
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (_STATES, self.n))
         length = 1.0 + sum(float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements)
@@ -352,7 +354,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def balanced(self) -> tuple[str, ...]:
-        """Joints of `gravity_free` on which gravity exerts none in any mounting: their load is balanced about them."""
+        """Joints of `gravity_free` that are free in any mounting, because their load is balanced about the axis."""
         free = set(self.gravity_free)
         for axis in np.eye(3) if free else ():
             mounted = replace(self, edits=replace(self.edits, gravity=tuple(axis.tolist())), answer_check=None)
@@ -406,13 +408,18 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         """
         return Robot(*described(model)).announced()
 
-    def announced(self) -> Robot:
-        """Warn of `announced_findings`, and return the robot with warnings of its queries if M is nearly singular."""
-        announce(self.name, self.announced_findings, len(self.findings))
+    def announced(self, *, known: tuple[str, ...] = ()) -> Robot:
+        """Warn of `announced_findings`; if M is nearly singular, return a robot whose queries warn of lost digits.
+
+        Args:
+            known: Findings that were announced before.
+        """
+        new = [finding for finding in self.announced_findings if finding not in known]
+        announce(self.name, new, len({*self.findings} - {*known}))
         regularity = self._evaluation.regularity
         if regularity.singular or not regularity.near:
             return self
-        return replace(self, answer_check=resolve_name(_CHECK_OF_NEARLY_SINGULAR)(LEAST_DIGITS))
+        return replace(self, answer_check=resolve_name(_CHECK_OF_NEARLY_SINGULAR)(MIN_DIGITS))
 
     @takes_changes
     def with_(self, **changes: Unpack[Changes]) -> Robot:
@@ -422,8 +429,8 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
                 several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg], or
                 "urdf" for `stated_armature`; mass_scale: factor on mass and inertia of all links; mass_scales: the
-                same by link, for another density; masses and inertias: values by link that replace the file's, in [kg],
-                and (3, 3) in [kg m²], where masses alone leave the inertia as it is.
+                same factor by link, for another density; masses and inertias: values by link that replace the file's,
+                in [kg] and (3, 3) in [kg m²]; masses alone do not change the inertia.
 
         Raises:
             EditError: If a name is unknown or a value is not allowed, or "urdf" is given and the file states none.
@@ -441,35 +448,55 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return robot if self.answer_check is None else replace(robot, answer_check=self.answer_check)
 
     def attach(
-        self, gripper: Robot, *, frame: str, prefix: str = "", xyz: ArrayLike = (0.0, 0.0, 0.0),
+        self, gripper: Robot | str | Path, *, frame: str, prefix: str = "", xyz: ArrayLike = (0.0, 0.0, 0.0),
         rpy: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Robot:  # fmt: skip
-        """Return this arm with a gripper, whose root is fixed to a link of the arm.
+        """Return this arm with a gripper whose root is fixed to a link of the arm.
 
-        Edits of both are kept. The joints of the gripper have its names with the prefix; `joint_names` has their order.
+        Edits of both are kept. Joints of the gripper keep their names, with the prefix; `joint_names` is their order.
 
         Args:
-            gripper: A robot with a fixed base, with any number of joints, for example from `rd.load("gripper.urdf")`.
+            gripper: A robot with a fixed base, for example from `rd.load("gripper.urdf", xacro={})`; or a name or path
+                as in `load`, where a tool without moving joints is allowed.
             frame: Link of the arm that carries it, for example "tool0".
             prefix: Text before the names of links and joints of the gripper, for example "g_".
             xyz: Position of the gripper's root in the frame, (3,) in [m].
             rpy: Its orientation there as roll, pitch and yaw, as in a URDF, (3,) in [rad].
 
         Raises:
-            EditError: If there is no such link, a name occurs in both robots, the base of the gripper moves, or gravity
-                of the gripper was changed.
+            EditError: If there is no such link, a name occurs in both robots, the base of the gripper moves, or the
+                gripper's gravity was changed.
+            CatalogError: If there is no such file.
+            DescriptionError: If the file is refused.
+
+        Warns:
+            ModelWarning: Once, if the file of the gripper adds findings.
         """
-        instance("gripper", gripper, Robot, "give a robot, for example rd.load('gripper.urdf')", error=EditError)
+        from_file = not isinstance(gripper, Robot)
+        instance("gripper", gripper, Robot | str | Path, "give a robot, or the path of its file", error=EditError)
+        tool, of_tool = read_file(gripper) if from_file else (gripper.description, gripper.edits)
         place = (numbers(name, value, (3,), error=EditError) for name, value in (("xyz", xyz), ("rpy", rpy)))
-        description = attached(self.description, gripper.description, frame, prefix, *place)
-        edits = attached_edits(self.edits, gripper.edits, gripper.description, prefix)
-        return Robot(description, edits, self.answer_check or gripper.answer_check)
+        description = attached(self.description, tool, frame, prefix, *place)
+        edits = attached_edits(self.edits, of_tool, tool, prefix)
+        robot = Robot(description, edits, self.answer_check or (None if from_file else gripper.answer_check))
+        return robot.announced(known=self.findings) if from_file else robot
+
+    def with_soft_limits(self) -> Robot:
+        """Return a robot whose position limits are narrowed to the soft limits of its file, for example for a planner.
+
+        Continuous joints, which have no position limits, do not change. Effects that stop at `soft_lower` and
+        `soft_upper` do not need it.
+
+        Raises:
+            EditError: If the file states no soft limits, or those of a joint leave no position within its limits.
+        """
+        return Robot(within_soft_limits(self.description), self.edits, self.answer_check)
 
     def to_urdf(self, path: str | Path) -> Path:
         """Write the robot with its edits as a URDF; an existing file is replaced.
 
-        Locked joints become fixed joints, payloads become links. Mesh addresses are kept; relative ones are adapted to
-        the new folder.
+        Locked joints become fixed joints, payloads become links. Soft limits and mesh addresses are kept; relative
+        addresses are adapted to the new folder.
 
         Args:
             path: Path with suffix .urdf, which is added if missing; not the file that the robot was read from.

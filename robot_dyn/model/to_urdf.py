@@ -2,7 +2,7 @@
 
 Locked joints, and joints that follow them, are fixed at T · exp(ξ̂ q); payloads become separate links; edited masses
 and inertias replace the file's. Other literals are unchanged; rotations of locked joints are converted to roll, pitch
-and yaw. Shapes and materials are copied; other elements, for example transmissions, are left out.
+and yaw. Shapes, materials and soft limits are copied; other elements, for example transmissions, are left out.
 """
 
 from __future__ import annotations
@@ -73,19 +73,19 @@ def _not_stated(edits: Edits) -> list[str]:
 
 
 def _fix_locked(out: Any, values: dict[str, float]) -> None:
-    """Make locked joints and their followers fixed, and reduce chains of followers to single steps."""
+    """Make locked joints and their followers fixed, and let followers of followers refer to the first joint."""
     mimics = stated_mimics(out)
     for joint in out.iterfind("joint"):
         name, mimic = joint.get("name"), joint.find("mimic")
         source, ratio, offset = resolve(name, mimics, FLOAT64)
         if source in values and joint.get("type") != "fixed":
-            _hold(joint, ratio * values[source] + offset)
+            _fix(joint, ratio * values[source] + offset)
         elif mimic is not None and mimic.get("joint") != source:
             for key, value in (("joint", source), ("multiplier", repr(float(ratio))), ("offset", repr(float(offset)))):
                 mimic.set(key, value)
 
 
-def _hold(joint: Any, value: float) -> None:
+def _fix(joint: Any, value: float) -> None:
     """Make a joint fixed at a value."""
     origin, axis = joint.find("origin"), _numbers(joint.find("axis").get("xyz"))
     axis, R, p = axis / np.linalg.norm(axis), rotation_rpy(_numbers(origin.get("rpy"))), _numbers(origin.get("xyz"))
@@ -113,12 +113,16 @@ def _restate(joint: Any) -> None:
 
 
 def _draw(out: Any, description: Description, folder: Path) -> None:
-    """Copy the shapes of links, and the materials, from the original text."""
+    """Copy the shapes of links, the materials and the soft limits from the original text."""
     read, _ = parse(description.text, description.source)
     shapes = {(link.get("name") or "").strip(): link for link in read.iterfind("link")}
     for link in out.iterfind("link"):
         if (drawn := shapes.get(link.get("name"))) is not None:
             link.extend(deepcopy(element) for element in drawn if element.tag in _DRAWN)
+    moving = {joint.get("name"): joint for joint in out.iterfind("joint") if joint.get("type") != "fixed"}
+    for joint in read.iterfind("joint[safety_controller]"):
+        if (written := moving.get((joint.get("name") or "").strip())) is not None:
+            written.append(deepcopy(joint.find("safety_controller")))
     for material in reversed(read.findall("material")):
         out.insert(0, deepcopy(material))
     source = Path(description.source)

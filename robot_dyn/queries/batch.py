@@ -1,7 +1,7 @@
-"""Batches: a query evaluates all states, or raises an error that names the first one without a result.
+"""Batches: a query evaluates all states, or raises an error that names the first state without a result.
 
-For `nan_rows`, states without a result become NaN. A batch is evaluated as a whole; if that fails, it is halved until
-the states without a result are isolated.
+For `nan_rows`, the result of such states is NaN. A batch is evaluated as a whole; if that fails, it is halved until the
+states without a result are isolated.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def answered(
         QueryError: If the batch axes do not match.
         NotFiniteError: If an argument is not finite.
         OverflowedError: If a result is not finite, or q or t is too large for the arithmetic.
-        SingularError: If M is singular in forward dynamics. In a batch, all of these name the row.
+        SingularError: If M is singular in forward dynamics. In a batch, the last three name the row.
     """
     batch = check_batches(**arrays)
 
@@ -60,7 +60,9 @@ def answered(
         if isinstance(answer, np.ndarray) and answer.dtype == object:
             answer = arithmetic.array(answer)  # constant entries 0 and 1 may still be integers
         if not arithmetic.finite(answer).all():
-            raise OverflowedError(f"{', '.join(arrays)} are so large that the result overflows")
+            raise OverflowedError(
+                f"the result overflows: {', '.join(arrays)} {'is' if len(arrays) == 1 else 'are'} too large"
+            )
         return answer
 
     if 0 in batch:
@@ -74,21 +76,21 @@ def answered(
         rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
         result = np.full((len(rows[0]), *shape), arithmetic.number("nan"), dtype=arithmetic.dtype)
         _halved(attempt, rows, result, 0, len(result), batch, nan)
-        _together(attempt, rows, result, arithmetic)
+        _in_one_batch(attempt, rows, result, arithmetic)
     return result.reshape((*batch, *shape))
 
 
-def _together(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
-    """Evaluate all states with a result in one batch, in which they also replace the others.
+def _in_one_batch(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
+    """Evaluate all states with a result in one batch, in which a copy of the first of them replaces each other state.
 
-    Their bits then do not depend on the other states of the batch: a kernel may round one state, or part of a batch,
+    Their bits then do not depend on the other states: a kernel may round a single state, or part of a batch,
     differently.
     """
     answers: np.ndarray = np.all(arithmetic.finite(result).reshape(len(result), -1), axis=1)
     if answers.all() or not answers.any():
         return
     replacement = int(np.argmax(answers))
-    with suppress(*_REFUSALS, DoubtError):  # if the whole batch is in doubt, the separate results remain
+    with suppress(*_REFUSALS, DoubtError):  # if the whole batch fails, the separate results remain
         whole = attempt(*(np.where(answers[:, None], x, x[replacement]) for x in rows))
         result[answers] = whole[answers]
 

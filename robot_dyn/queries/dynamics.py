@@ -1,6 +1,6 @@
-"""The queries of every engine, one table: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q.
+"""The queries of every engine, and their table: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q.
 
-A new query is a method of `Dynamics` with its row, Pinocchio's call in `model/calls.py` and the formula in
+To add a query, write a method of `Dynamics`, Pinocchio's call in `model/calls.py` and the formula in
 `lagrange/formulas.py`, both under its name. Engines, machine code, cross-check, certificates and commands follow.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import FLOAT64, Array, rounding
 from robot_dyn.foundations.errors import OverflowedError, SingularError, UndecidedError, shown
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.foundations.names_nearest import NamesNearest
+from robot_dyn.foundations.suggestions import SuggestsNames
 from robot_dyn.foundations.validate import JointValues, check_batches, choice, shaped
 from robot_dyn.queries.batch import into
 from robot_dyn.queries.quantity import DOUBTFUL, Quantity, query, table
@@ -33,7 +33,7 @@ class Axes(StrEnum):
     BODY: at the frame's origin, along the frame's axes: the body twist g⁻¹ġ. Pinocchio's LOCAL.
     WORLD: at the base's origin, along the base's axes: the spatial twist ġg⁻¹. Pinocchio's WORLD.
 
-    Pinocchio's names are accepted too, as strings or as `pinocchio.ReferenceFrame`.
+    Pinocchio's names are also accepted, as strings or as `pinocchio.ReferenceFrame`.
     """
 
     WORLD_ALIGNED = "world_aligned"
@@ -42,7 +42,7 @@ class Axes(StrEnum):
 
     @classmethod
     def from_name(cls, name: object) -> Axes:
-        """Return the axes of that name; raise QueryError for any other."""
+        """Return the axes of a name; raise QueryError if it is unknown."""
         text = name if isinstance(name, str) else str(getattr(name, "name", shown(name)))  # Pinocchio's have names
         return cls(choice("expressed_in", _OF_PINOCCHIO.get(text, text), list(cls)))
 
@@ -63,7 +63,7 @@ def _placement_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarra
 
 
 def _jacobian_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
-    """Return the sum of lever and reach: a lever is a difference of positions, whose scale is their size."""
+    """Return the sum of lever and reach: a lever is a difference of positions, which have the scale of the reach."""
     arm = size.lever[frame] + size.reach[frame]
     return np.vstack([np.tile(arm, (3, 1)), np.ones((3, len(arm)))])
 
@@ -73,7 +73,7 @@ def _jacobian_rate_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.nd
     return np.vstack([np.tile(arm * v.sum() + arm @ v, (3, 1)), np.full((3, len(v)), v.sum())])
 
 
-class Dynamics(NamesNearest, ABC, Generic[Answer]):
+class Dynamics(SuggestsNames, ABC, Generic[Answer]):
     """Rigid bodies in gravity: M(q) a + C(q, v) v + N(q) = τ.
 
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
@@ -195,7 +195,7 @@ class Dynamics(NamesNearest, ABC, Generic[Answer]):
     def centroidal_momentum_matrix(self, q: JointValues, *, out: Answer | None = None) -> Answer:
         """Centroidal momentum matrix A_G of the moving bodies: momentum (linear, angular) = A_G v about their centre.
 
-        In base axes. Its linear part is m ċ; armature does not count. [Orin, Goswami, Lee 2013]
+        The momentum is in base axes; its linear part is m ċ. Armature does not count. [Orin, Goswami, Lee 2013]
         """
         return self._answer("centroidal_momentum_matrix", (q,), out)
 
@@ -206,8 +206,8 @@ class Dynamics(NamesNearest, ABC, Generic[Answer]):
     ) -> Answer:  # fmt: skip
         """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
 
-        With a reference velocity v_r and a its acceleration: Y θ = M a + C(q, v) v_r + N − armature · a, as
-        adaptive controllers need it. C is linear in v, so that this is Y(½(v + v_r), a) − Y(½(v − v_r), 0) + Y(0, 0).
+        For adaptive controllers, with a reference velocity v_r and its acceleration a: Y θ = M a + C(q, v) v_r + N −
+        armature · a. C is linear in v, so this is Y(½(v + v_r), a) − Y(½(v − v_r), 0) + Y(0, 0).
 
         Y depends on geometry, gravity and couplings, but not on masses: θ can be identified from measured torques,
         except for combinations that no motion distinguishes, for which Y is rank-deficient.

@@ -15,7 +15,7 @@ from robot_dyn.foundations.arithmetic import Scalar
 from robot_dyn.queries.units import of_joint
 
 DOUBTFUL = 1e10  # ‖a‖ above which M may be singular at this q, hidden by rounding
-MOST_DIGITS = 20  # maximum number of digits counted
+MAX_DIGITS = 20  # maximum number of digits counted
 
 State = Mapping[str, Scalar]
 Key = str | tuple[str, ...]  # name of a query, or (name, link) or (name, link, axes) of a query of a frame
@@ -27,8 +27,8 @@ _PARAMETERS = {
     "a": "Accelerations, shape (..., n), in [rad/s²] or [m/s²].",
     "v_r": "Reference velocities, shape (..., n), in [rad/s] or [m/s]; v by default.",
     "tau": "Torques, shape (..., n), in [N m] or [N].",
-    "frame": "Name of a link, or of a joint, whose frame is that of its child link. A shared name means the link.",
-    "expressed_in": """Axes and point of the twist: "world_aligned" (at the frame's origin, along the base's axes),
+    "frame": "Name of a link, or of a joint for the frame of its child link; if both have the name, the link is meant.",
+    "expressed_in": """Axes and reference point of the twist: "world_aligned" (frame's origin, along the base's axes),
         "body" (along the frame's axes) or "world" (at the base's origin); or Pinocchio's names "local_world_aligned",
         "local", "world".""",
     "out": "Array that receives the result and is returned; it is unchanged if the query raises.",
@@ -43,22 +43,22 @@ def _no_terms(size: Any, x: State) -> float:
 @final
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity that an engine computes in the method of its name.
+    """A quantity that an engine computes by the method of the same name.
 
     Attributes:
         name: Name of the method.
         description: First line of its docstring.
         arguments: Names of its arguments, each of shape (..., n); "t" is a time.
-        axes: Shape for one state: numbers, or letters for numbers of a robot (`sizes`): "n" its degrees of freedom,
-            "p" its inertial parameters. Every query accepts batches, see `queries.batch`.
+        axes: Shape for one state: numbers, or letters for sizes of a robot: "n" degrees of freedom, "p" inertial
+            parameters. Every query accepts batches, see `queries.batch`.
         unit: Unit for revolute joints; `units.of_joint` converts it for prismatic ones.
         terms: Function that returns the sum of the absolute values of the terms of each entry, from
             `lagrange.magnitude.Magnitudes` at q, the absolute values of the arguments by name, and the frame if it
-            has one. Where M a = τ is solved, the terms of that τ.
+            has one. If M a = τ is solved, it returns the terms of τ.
         framed: True for a quantity of a frame.
         directed: True if the axes of its twist are an option.
         definite: True for a symmetric positive definite matrix, so that |x_ij| ≤ √(x_ii x_jj).
-        solves: True if M a = τ is solved: no result where M is singular, and errors proportional to M's condition.
+        solves: True if M a = τ is solved: there is no result if M is singular, and errors grow with M's condition.
         doubtful: Size of a result above which M may be singular.
         digits: True if `rd.accuracy.digits` and certificates count its digits.
     """
@@ -86,7 +86,7 @@ class Quantity:
             return (self.unit,)
         return tuple(dict.fromkeys(of_joint(self.unit, kind) for kind in joint_types))
 
-    def ask(self, engine: Any, state: State, *frame: str, **options: Any) -> Any:
+    def evaluate(self, engine: Any, state: State, *frame: str, **options: Any) -> Any:
         """Return the result of an engine at a state, with arguments by name."""
         return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame, **options)
 

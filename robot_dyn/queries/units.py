@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.foundations.coefficients import Coefficient, Jointed, declared
+from robot_dyn.foundations.coefficients import Coefficient, HasJointNames, declared
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-_ROUNDING = 1e-12  # some thousand rounding units 2⁻⁵³, which sums of terms of that size may leave instead of 0
-_NONE = 1e9  # stops farther away count as none
+_ROUNDING = 1e-12  # about 10⁴ rounding units 2⁻⁵³, which a sum may leave instead of 0
+_NONE = 1e9  # larger limits count as none
 _UNITS = {"q": ("rad", "m"), "v": ("rad/s", "m/s"), "a": ("rad/s²", "m/s²"), "tau": ("N m", "N"), "u": ("N m", "N")}
 
 
@@ -36,12 +36,12 @@ def of_joint(stated: str, joint_type: str | None) -> str:
 
 def coefficient_unit(coefficient: Coefficient, joint_types: Iterable[str | None]) -> str:
     """Return the unit of a coefficient, or both distinct units for revolute and prismatic joints."""
-    kinds = joint_types if coefficient.of_joints else (None,)
+    kinds = joint_types if coefficient.is_per_joint else (None,)
     return " or ".join(dict.fromkeys(of_joint(coefficient.unit, kind) for kind in kinds))
 
 
-def joint_types_of(dynamics: Jointed) -> tuple[str | None, ...]:
-    """Return the joint types of a dynamics' robot; None for each joint if it has no robot."""
+def joint_types_of(dynamics: HasJointNames) -> tuple[str | None, ...]:
+    """Return the joint types of the robot of a dynamics object; None for each joint if it has no robot."""
     return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * len(dynamics.joint_names))
 
 
@@ -63,7 +63,7 @@ def coefficient_texts(part: object, joint_types: Sequence[str | None], signal: s
         values, symbol = getattr(part, name), coefficient.symbol.partition(",")[0] or name
         if values is None or name.startswith("_"):  # internal to a run
             continue
-        if coefficient.of_joints:
+        if coefficient.is_per_joint:
             values = np.broadcast_to(values, len(joint_types))
             original = [_one(x, coefficient, kind) for x, kind in zip(values, joint_types, strict=True)]
             texts[name] = f"{symbol} = {', '.join(original if len(set(original)) > 1 else original[:1])}"
@@ -89,8 +89,8 @@ def format_duration(seconds: float) -> str:
 def without_rounding(values: ArrayLike) -> np.ndarray:
     """Return numbers for display, with 0 for −0 and for values below 1e-12 of the array's largest finite one.
 
-    Where terms cancel, float64 leaves some units of 1e-16 of the terms; such a remainder is meaningless. Files and JSON
-    contain the exact numbers.
+    If terms cancel, float64 leaves a meaningless remainder of about 1e-16 of the terms. Files and JSON contain the
+    exact numbers.
 
     Args:
         values: Numbers of one quantity, in one unit of force or motion, any shape.

@@ -1,4 +1,4 @@
-"""The base of measured results with its files, their figure, versions and times.
+"""The base of measured results: their files, figures, versions and times.
 
 result            base class of results: a sentence, tables, omitted parts; saved as figure, CSV or JSON
 figure            the layout of their figures

@@ -87,7 +87,7 @@ def take_turns(
 ) -> dict[str, RobotDynError]:
     """Time runs alternately, at most `turns` times; return the errors of failing runs, by name.
 
-    The first run of each, which compiles and loads, is not counted and excluded from the budget.
+    The first run of each, which compiles and loads, is neither counted nor charged to the budget.
 
     Args:
         runs: The runs.

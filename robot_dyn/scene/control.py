@@ -44,7 +44,7 @@ class Model(Part):
     """The controller's model of the arm, if it differs from the plant; a table of `[control]`."""
 
     mass_scale: Positive = 1.0
-    """Factor on mass and inertia of all links, payloads excepted."""
+    """Factor on mass and inertia of all links, except payloads."""
     effects: list[AnyEdit] | None = None  # pyright: ignore[reportInvalidTypeForm]
     """Gravity, lock, payload and armature of the model, written like `[[effect]]`; by default the scene's."""
 
@@ -109,7 +109,7 @@ class Control(Part):
 
     @property
     def unused(self) -> dict[str, str]:
-        """Keys without effect for this kind, these gains and these blocks, with the reason."""
+        """Keys that have no effect with this kind, these gains and these blocks, with the reason."""
         kinds = {key: kind for key, kind in _OF_ONE_KIND.items() if self.kind != kind}
         reasons = {key: f"on {self.kind}, only on {kind}" for key, kind in kinds.items()}
         if self.kp is not None:

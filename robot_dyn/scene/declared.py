@@ -53,9 +53,9 @@ _UNDECLARED = Coefficient(shapes=((), ("k",), ("k", "m")))
 
 def _argument(name: str, value: Any, robot: Robot, form: Coefficient | None) -> Any:
     """Return a number, an array for a list, an array (n,) for a value by joint; texts and truth values unchanged."""
-    if form is None or (form.of_rows and isinstance(value, dict)):
+    if form is None or (form.is_list and isinstance(value, dict)):
         return value
-    if form.of_joints or isinstance(value, dict):
+    if form.is_per_joint or isinstance(value, dict):
         return per_joint(name, value, robot, elsewhere=form.fill_value)
     if isinstance(value, list):
         return numbers(name, value, ("k",), ("k", "m"), error=SceneError)
@@ -92,7 +92,7 @@ def declared_part(
     for key, (name, form) in keys.items():
         default = parameters[name].default
         default = (URDF if form.stated else ...) if default is Parameter.empty else default
-        none = f"; joints left out have {'none' if isinf(form.fill_value) else f'{form.fill_value:g}'}"
+        none = f"; omitted joints have {'none' if isinf(form.fill_value) else f'{form.fill_value:g}'}"
         none = none if form.fill_value else ""
         fields[key] = (_type(form), Field(default, description=f"{form.symbol}{none}."))
     text = text or (getdoc(factory) or kind).partition("\n\nAttributes:")[0]
@@ -103,7 +103,7 @@ def declared_part(
 
 def _type(form: Coefficient) -> Any:
     """Return the type of a key: a value by joint, three numbers, one number, or anything for other shapes."""
-    if form.of_joints:
+    if form.is_per_joint:
         return Stated if form.stated else PerJoint
     if form.shapes == ((3,),):
         return Vector3

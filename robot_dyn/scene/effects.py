@@ -112,7 +112,7 @@ class Gravity(Edit):
 
 
 class Lock(Edit):
-    """Joints held at a value: their links become part of the links before them."""
+    """Joints fixed at a value: their links become part of the parent links."""
 
     kind: Literal["lock"]
     joints: dict[str, Number]
@@ -138,7 +138,7 @@ class Armature(Edit):
     inertia_kg_m2: Stated
     """Inertia by joint, of the rotor if there is a gear; "urdf" for the values of the file, after gears."""
     gear_ratio: PerJoint = 1.0
-    """n: n² times the inertia of the rotor acts at the joint; joints left out have 1."""
+    """n: n² times the inertia of the rotor acts at the joint; omitted joints have 1."""
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
         if self.inertia_kg_m2 == URDF:
@@ -196,7 +196,7 @@ class Wrench(Acting):
 
 
 class MassScale(Edit):
-    """Factors on mass and inertia of single links: the same shape with another density; payloads excepted."""
+    """Factors on mass and inertia of single links, except payloads: the same shape with another density."""
 
     kind: Literal["mass_scales"]
     factors: dict[str, Positive]
@@ -220,7 +220,7 @@ _LINE = declared_part(
 )  # fmt: skip
 _MOTOR = declared_part(
     DeclaredEffect, "torque_speed_limit", TorqueSpeedLimit,
-    others={"at": (Literal["joint", "motor"], Field("joint", description="The place of speeds and torques."))},
+    others={"at": (Literal["joint", "motor"], Field("joint", description="Where speeds and torques are measured."))},
 )  # fmt: skip
 _OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, _MOTOR, Wrench, Carried)}
 """Tables that are not built from one class, by kind."""

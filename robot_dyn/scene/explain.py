@@ -16,7 +16,7 @@ from robot_dyn.effects.explanation import (
     Explanation,
     Number,
     Term,
-    as_they_act,
+    acting_coefficients,
     edit_terms,
     explanation,
     term_of,
@@ -42,8 +42,8 @@ _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 def explain(system: Setup | Plant | Dynamics | str | Path) -> Explanation:
     """Explain the equation of motion: its terms, the effects with their coefficients, and effects not simulated.
 
-    The `repr` of the result are the lines that `robot-dyn explain` prints, `to_json()` is the document of
-    `robot-dyn explain --json`. For a scene file it includes the source of each number.
+    The `repr` of the result is the text that `robot-dyn explain` prints, and `to_json()` returns the document of
+    `robot-dyn explain --json`. For a scene file both include the source of each number.
 
     Args:
         system: A setup, a plant, a robot, or the path of a scene file.
@@ -91,7 +91,7 @@ def _terms(scene: Scene, setup: Setup) -> Iterator[Term]:
     edited = {term.kind: term.coefficients for term in edit_terms(robot.edits)}  # pyright: ignore
     for effect in scene.effect:
         parts = list(islice(effects, len(effect.build(robot)))) if isinstance(effect, Acting) else []  # pyright: ignore
-        numbers, acting = _numbers(effect), as_they_act(parts, robot)
+        numbers, acting = _numbers(effect), acting_coefficients(parts, robot)
         if isinstance(effect, Edit) and any(number.source == OF_FILE for number in numbers):
             acting = edited.get(effect.kind, ())
         yield Term(effect.kind, term_of(parts) if parts else EDITED[effect.kind], numbers, acting)

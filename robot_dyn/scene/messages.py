@@ -65,7 +65,7 @@ def named_by_key(keys: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str]) -> Iterator[None]:
-    """Note in errors the path of the first part that their message names, and put its place before the message.
+    """Find the first part named in the message of an error; add its path to the error and its place to the message.
 
     Args:
         paths: Paths by the words that stand for them in messages, such as "step_s" or "coulomb_friction".

@@ -67,7 +67,7 @@ class Quintic(Reference):
 
 
 class ViaPoints(Reference):
-    """A spline from the start, at rest, through at most 2000 points; at rest at the end unless v1 is given.
+    """A spline from rest at the start through at most 2000 points, which ends at rest unless v1 is given.
 
     The points are given by times_s and points, or by a file.
     """

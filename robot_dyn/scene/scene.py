@@ -61,14 +61,14 @@ class Loading(Part):
 
 
 class Attachment(Part):
-    """A gripper fastened to a link of the arm; it is a robot with any number of joints."""
+    """A gripper or rigid tool fastened to a link of the arm."""
 
     robot: str
     """Name of a robot of the catalog, or path of a URDF or MJCF, relative to the folder of the scene."""
     frame: str
     """Link of the arm that carries it."""
     prefix: str = ""
-    """Text before the names of its links and joints."""
+    """Prefix of the names of its links and joints."""
     xyz_m: Vector3 = (0.0, 0.0, 0.0)
     """Position of its root in the frame."""
     rpy_rad: Vector3 = (0.0, 0.0, 0.0)
@@ -76,8 +76,9 @@ class Attachment(Part):
     load: Loading = Loading()
     """Options for reading its file."""
 
-    def attach(self, arm: Robot, gripper: Robot) -> Robot:
-        """Return the arm with the gripper."""
+    def attach(self, arm: Robot, path: str | Path) -> Robot:
+        """Return the arm with the gripper of a file; without options for reading, it needs no moving joint."""
+        gripper = self.load.robot(path) if self.load != Loading() else path
         return arm.attach(gripper, frame=self.frame, prefix=self.prefix, xyz=self.xyz_m, rpy=self.rpy_rad)
 
 
@@ -163,7 +164,7 @@ class Scene(Part):
             kinds = [effect.kind for effect in effects]
             for kind in ("gravity", "armature"):
                 if (count := kinds.count(kind)) > 1:
-                    raise wrong_key(place, f"{kind} is named {count} times, but only the last would act; keep one")
+                    raise wrong_key(place, f"{kind} appears {count} times, but only the last would act; keep one")
         return self
 
     def setup(self, folder: Path, metadata: dict[str, str]) -> Setup:
@@ -172,7 +173,7 @@ class Scene(Part):
             loaded = self.load.robot(_path_or_name(folder, self.robot))
         for k, gripper in enumerate(self.attach):
             with part("attach", k):
-                loaded = gripper.attach(loaded, gripper.load.robot(_path_or_name(folder, gripper.robot)))
+                loaded = gripper.attach(loaded, _path_or_name(folder, gripper.robot))
         robot = bare(loaded)
         acting: list[Effect] = []
         paths: dict[str, tuple[str | int, ...]] = {}  # by the words of messages that stand for them

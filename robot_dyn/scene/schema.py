@@ -94,7 +94,7 @@ Positive = Annotated[float, Field(gt=0, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, strict=True)]
 Truth = Annotated[bool, Field(strict=True)]
 Vector3 = Annotated[tuple[Number, Number, Number], Form("a list of 3 finite numbers", "list of 3 numbers")]
-_BY_JOINT = "a finite number, a list of them or a table of them by joint"  # a joint left out of a table has 0
+_BY_JOINT = "a finite number, a list of them or a table of them by joint"  # joints omitted from a table have 0
 PerJoint = Annotated[Number | list[Number] | dict[str, Number], Form(_BY_JOINT, "by joint")]
 Point = Annotated[
     list[Number] | dict[str, Number],

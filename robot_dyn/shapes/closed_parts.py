@@ -19,7 +19,7 @@ from robot_dyn.shapes.winding import just_inside, winding
 
 _SAME = 1e-7  # relative to the size of a mesh: closer corners are merged
 _FLAT = 1e-9  # relative to the cube of its length: smaller volumes count as none
-_MOST, _FEWEST, _WORK = 192, 48, 4_000_000  # limits of the points on a part; limit of points × triangles
+_MAX, _FEWEST, _WORK = 192, 48, 4_000_000  # limits of the points on a part; limit of points × triangles
 
 
 @final
@@ -159,7 +159,7 @@ def _common(low: ndarray, high: ndarray, lows: ndarray, highs: ndarray) -> list[
 
 def _fraction_inside(part: ndarray, other: ndarray) -> float:
     """Return the fraction of points just inside a part that lie inside another one."""
-    points = just_inside(part, int(np.clip(_WORK // max(len(part), len(other)), _FEWEST, _MOST)))
+    points = just_inside(part, int(np.clip(_WORK // max(len(part), len(other)), _FEWEST, _MAX)))
     low, high = other.min(axis=(0, 1)), other.max(axis=(0, 1))
     near = ((points > low) & (points < high)).all(axis=1)
     if not near.any():

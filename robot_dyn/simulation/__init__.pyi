@@ -18,6 +18,7 @@ from robot_dyn.simulation.results.doubts import Doubt as Doubt
 from robot_dyn.simulation.results.doubts import DoubtKind as DoubtKind
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate as ErrorEstimate
 from robot_dyn.simulation.results.error_estimate import Verdict as Verdict
+from robot_dyn.simulation.results.joint_wrenches import KNOWN_ON_LINKS as KNOWN_ON_LINKS
 from robot_dyn.simulation.results.ledger import Ledger as Ledger
 from robot_dyn.simulation.results.provenance import robot_of as robot_of
 from robot_dyn.simulation.results.run_data import SAMPLED as SAMPLED

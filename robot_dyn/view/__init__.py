@@ -8,7 +8,7 @@ series.py, tables.py  the plots and the table of a page
 commands.py      the canvas: commands of meshcat's viewer
 page.py, picture.py       the page as a value; its still picture
 geometry/        meshes and shapes, as triangles fastened to links
-live/            the server on this machine
+server.py        the server of a page on this machine
 plots/           figures by Matplotlib
 video/           videos of pages
 web/             script, style and HTML of the page, and its text

@@ -14,7 +14,7 @@ from robot_dyn.simulation.results.causes import causes_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.series import effort_limits
 
-_MOST = 2000  # samples; no slider is wider in pixels of a screen
+_MAX = 2000  # samples; no slider is wider in pixels of a screen
 _STEPS = 32767  # largest 16-bit integer, for the largest torque of a joint
 
 
@@ -28,7 +28,7 @@ def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
     known = np.flatnonzero(np.isfinite(parts).all(axis=(0, 2)))
     if not len(known):
         return None
-    at = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), _MOST)).round().astype(int))]
+    at = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), _MAX)).round().astype(int))]
     limits = effort_limits(run, robot.effort_limit)
     of_joints = zip(split.joints, split.types, limits, np.moveaxis(parts[:, at], 2, 0), strict=True)
     return {"t": split.t[at], "names": list(split.torques), "joints": [_joint(*columns) for columns in of_joints]}

@@ -1,7 +1,7 @@
-"""Commands of meshcat's viewer as values, with NumPy arrays in them, and the two ways they reach a page.
+"""Commands of meshcat's viewer as values, with NumPy arrays in them, and their text inside a page.
 
-A command travels as MessagePack over a web socket, or with all others in one compressed text inside the page, in which
-an array that occurs in several commands is stored once. Objects follow three.js's JSON format 4.5.
+All commands are one compressed text, in which an array that occurs in several commands is stored once. Objects follow
+three.js's JSON format 4.5.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from robot_dyn.shapes.triangles import Mesh
 Command = dict[str, Any]
 Rgba = tuple[float, float, float, float]
 
-_EXTENSION = {"int8": 0x11, "uint8": 0x12, "uint16": 0x14, "uint32": 0x16, "float32": 0x17, "float64": 0x18}
 _KINDS = {"position": "vector", "quaternion": "quaternion", "scale": "vector", "visible": "bool"}  # types of tracks
 _DOUBLE_SIDE = 2  # meshes of real robots have triangles that face the wrong way
 
@@ -106,16 +105,6 @@ def triangles(mesh: Mesh) -> Command:
     if mesh.colors is not None:
         attributes["color"] = _attribute(mesh.colors.astype(np.uint8), normalized=True)
     return _geometry(attributes, index={"type": _array_type(index), "array": index})
-
-
-def as_message(command: Command) -> bytes:
-    """Return a command as a message for meshcat's web socket."""
-    import umsgpack
-
-    def extension(array: np.ndarray) -> Any:
-        return umsgpack.Ext(_EXTENSION[array.dtype.name], array.tobytes())
-
-    return umsgpack.packb(command, ext_handlers={np.ndarray: extension})
 
 
 def as_text(document: Any) -> str:

@@ -36,7 +36,7 @@ from robot_dyn.view.sliders import sliders
 from robot_dyn.view.stage import Stage
 from robot_dyn.view.tables import cost_table, settings_table
 
-_MOST_EVENTS = 200  # listed events of a run
+_MAX_EVENTS = 200  # listed events of a run
 _FAR = 1e4  # [rad] or [m]; diverged runs are drawn up to here
 
 
@@ -103,8 +103,8 @@ def document_of(
         page.paths[stage.root] = {"frames": frames, "shown": traced}
         joints = {joint.joint: "rad" if joint.revolute else "m" for joint in stage.linkage.bodies}
         page.notes.append(stated_error(run, item.motion, item.keys, joints))
-        if len(run.events) > _MOST_EVENTS:
-            page.notes.append(f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots")
+        if len(run.events) > _MAX_EVENTS:
+            page.notes.append(f"the first {_MAX_EVENTS} of {len(run.events)} events are marked on the plots")
         page.notes += [*item.drawing.remarks, note, *draw_stops(page.canvas, stage, run, radius)]
         page.notes[start:] = [item.prefix + text for text in page.notes[start:]]
         if item.hidden:
@@ -127,9 +127,9 @@ def document_of(
         events=[
             {"t": event.t, "name": item.prefix + event.name}
             for item in shown
-            for event in item.run.events[:_MOST_EVENTS]
+            for event in item.run.events[:_MAX_EVENTS]
         ],
-        rests=[lane for item in shown for lane in lanes(item.run, item.prefix, _MOST_EVENTS)],
+        rests=[lane for item in shown for lane in lanes(item.run, item.prefix, _MAX_EVENTS)],
         plots=plots([item.run for item in shown], [item.stage for item in shown], [item.name for item in shown]),
         differs=settings_table(named),
         causes=split,

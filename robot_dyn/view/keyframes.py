@@ -19,7 +19,7 @@ from robot_dyn.simulation.results.run_data import TrajectoryData
 TOLERANCE = 5e-4  # [rad] or [m]; half a millimetre at a reach of one metre, below a pixel of the screen
 CHORD = TOLERANCE / 10  # largest error of lines between the times of a `Motion`
 _LARGEST_TURN = pi / 2  # between keyframes; from π on a viewer would take the shorter way round
-_MOST_PARTS = 64  # parts of the time between two samples
+_MAX_PARTS = 64  # parts of the time between two samples
 _LOOKS = (0.25, 0.5, 0.75)  # parts of that time at which the polynomial is compared with others
 _CHUNK = 20_000  # samples that are joined at a time
 
@@ -81,7 +81,7 @@ def _between(t: np.ndarray, h: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray
         q = polynomial(c, s)[0]
         off = np.maximum(off, np.abs(q - polynomial(lower, s)[0]).max(axis=0, initial=0.0))
         away = np.maximum(away, np.abs(q - (q0 + part * (q1 - q0))).max(axis=1, initial=0.0))
-    parts = np.clip(np.ceil(np.sqrt(away / CHORD)), 1, _MOST_PARTS).astype(int)  # a chord errs as 1/parts²
+    parts = np.clip(np.ceil(np.sqrt(away / CHORD)), 1, _MAX_PARTS).astype(int)  # a chord errs as 1/parts²
     of = np.repeat(np.arange(len(h)), parts)
     s = h[of] * (np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[of]
     return t[of] + s, polynomial(c[of], s[:, None])[0], off

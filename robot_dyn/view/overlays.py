@@ -23,7 +23,7 @@ _WRENCH: tuple[tuple[str, str, slice, str, Rgba], ...] = (
     ("force", "orange", slice(1, 4), "N", (0.84, 0.37, 0.0, 1.0)),
     ("torque", "pink", slice(4, 7), "N m", (0.8, 0.47, 0.65, 1.0)),
 )
-_MOST_PATHS = 60  # drawn paths of frames, per run
+_MAX_PATHS = 60  # drawn paths of frames, per run
 
 
 def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame: str) -> tuple[tuple[str, ...], str]:
@@ -44,7 +44,7 @@ def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame
     canvas.mesh(ball, triangles(sphere(0.02 * reach)), stage.tint(_COM))
     canvas.move(ball, position=(com.t, com.q))
     moving = [name for name, (body, _, _) in stage.linkage.links.items() if body != BASE]
-    frames = tuple(dict.fromkeys([frame, *reversed(moving)]))[:_MOST_PATHS]
+    frames = tuple(dict.fromkeys([frame, *reversed(moving)]))[:_MAX_PATHS]
     points = stage.positions(motion.q, frames)
     paths = [keyframes(motion.t, points[:, i], _PART * reach) for i in range(len(frames))]
     for name, drawn in zip(frames, paths, strict=True):

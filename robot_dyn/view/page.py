@@ -20,7 +20,7 @@ from robot_dyn.view.picture import HEIGHT, WIDTH, picture
 from robot_dyn.view.web.text import page_text
 
 if TYPE_CHECKING:
-    from robot_dyn.view.live.server import Server
+    from robot_dyn.view.server import Server
 
 _HEIGHT = 720  # height of a page in a notebook, in pixels
 PAGE = FileKind("a page", ".html", b"<!DOCTYPE html>")
@@ -53,7 +53,7 @@ class Page:
     @cached_property
     def text(self) -> str:
         """HTML of the page."""
-        return page_text({**self.document, "live": False})
+        return page_text(self.document)
 
     @cached_property
     def address(self) -> str:
@@ -112,9 +112,7 @@ class Page:
         return save_video(text, duration, path, fps, size, dark, browser, on_progress)
 
     def serve(self, port: int | None = None) -> Server:
-        """Serve the page live, on this machine only, at the `url` of the returned server, until the server is closed.
-
-        Other meshcat programs can draw into the scene at `zmq_url` of the server.
+        """Serve the page on this machine only, at the `url` of the returned server, until the server is closed.
 
         Args:
             port: Port to listen on; any free one if not given.
@@ -124,10 +122,9 @@ class Page:
             ServerError: If the port is taken.
         """
         port = None if port is None else integer("port", port, least=1, most=65535)
-        from robot_dyn.view.live.server import Server  # imports zmq and tornado
+        from robot_dyn.view.server import Server  # takes 30 ms to import
 
-        rest = {name: entry for name, entry in self.document.items() if name != "commands"}
-        return Server(page_text(rest | {"live": True}), self.document["commands"], port)
+        return Server(self.text, port)
 
     def __repr__(self) -> str:
         return f"<{self._title}: {self.address}>"

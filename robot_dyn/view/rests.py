@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _HOLD = {"dry_friction", "rigid_stops"}  # names of effects that hold joints
-_MOST = 200  # rests of a joint
+_MAX = 200  # rests of a joint
 
 
 class Rest(NamedTuple):
@@ -57,4 +57,4 @@ def _of_joint(run: TrajectoryData, i: int, t: np.ndarray, q: np.ndarray, v: np.n
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
     stops = set() if run.at_stop is None else set(run.q[run.at_stop[:, i], i].tolist())
     intervals = (Rest(float(t[a]), float(t[b]), float(q[a]) in stops) for a, b in edges.reshape(-1, 2) if t[b] > t[a])
-    return tuple(intervals)[:_MOST]
+    return tuple(intervals)[:_MAX]

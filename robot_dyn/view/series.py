@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Columns = dict[str, np.ndarray]  # by name
 
 _BUCKETS = 2000  # no plot is wider in pixels of a screen
-_MOST = 1e38  # largest number in single precision
+_MAX = 1e38  # largest number in single precision
 _UNSTATED = 1e300  # a limit of this size means none
 
 
@@ -150,7 +150,7 @@ def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
     series = [
         {
             "label": f"{curve.name}{' desired' * curve.is_desired}{curve.mark}",
-            "values": np.interp(t, curve.t, np.clip(curve.values, -_MOST, _MOST), right=np.nan).astype(np.float32),
+            "values": np.interp(t, curve.t, np.clip(curve.values, -_MAX, _MAX), right=np.nan).astype(np.float32),
             "color": colors[curve.name],
             "ghost": curve.is_ghost,
             "desired": curve.is_desired,

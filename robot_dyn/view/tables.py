@@ -12,7 +12,7 @@ from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _NONE = "–"
-_MOST_SETTINGS = 60
+_MAX_SETTINGS = 60
 
 
 def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
@@ -21,7 +21,7 @@ def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any
     if any(not comparable(first, other) for other in others):
         return {"runs": [], "rows": []}
     rows = [[name, *values] for name, values in values_by_run(first, *others).items()]
-    return {"runs": [name for name, _ in named], "rows": rows[:_MOST_SETTINGS]}
+    return {"runs": [name for name, _ in named], "rows": rows[:_MAX_SETTINGS]}
 
 
 def cost_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:

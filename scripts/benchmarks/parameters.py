@@ -11,14 +11,14 @@ import robot_dyn as rd
 from benchmarks.measure import READY, Effort, arms, row, seconds, table
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison, take_turns
 from robot_dyn.accuracy.costs.step_cost import PER_RUN, many_runs, numbers
-from robot_dyn.model.right_angles import completed
+from robot_dyn.model.right_angles import with_exact_right_angles
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.compiled.cache import machine_code_of_constants
 
 
 def parameters(effort: Effort) -> None:
     """Scenes of Panda-7 whose numbers are gravity, a payload, gains and coefficients; and what another value costs."""
-    arm = completed(arms()["Panda-7"])[0]
+    arm = with_exact_right_angles(arms()["Panda-7"])[0]
     held = arm.with_(payload=rd.Payload("panda_link8", 1.5, (0.01, 0.02, 0.1)))
     friction, goal = [rd.effects.ViscousFriction(0.5)], rd.control.quintic(READY, READY + 0.2, 1.0)
     scenes = {

@@ -78,7 +78,7 @@ def test_an_entry_that_is_moved_loses_the_digits_beyond(name: str, quantity) -> 
     """By 1e-k of its scale: k digits are left, of Pinocchio's 14 or more."""
     robot = rd.load(name)
     x = state(robot)
-    truth, answer = Exact(robot).at(quantity, x), np.array(quantity.ask(robot, x))
+    truth, answer = Exact(robot).at(quantity, x), np.array(quantity.evaluate(robot, x))
     assert (
         14
         < rd.accuracy.digits(robot, quantity.name, *(x[each] for each in quantity.arguments))
@@ -174,7 +174,7 @@ def test_any_function_can_check_the_answers_of_a_robot() -> None:
     robot, x = rd.load("planar_2r"), state(rd.load("planar_2r"))
     watched = replace(robot, answer_check=lambda robot, query, arguments, answer: seen.append((query, len(arguments))))
     for each in QUANTITIES.values():
-        each.ask(watched.with_(mass_scale=1.1), x)
+        each.evaluate(watched.with_(mass_scale=1.1), x)
     assert seen == [(each.name, len(each.arguments)) for each in QUANTITIES.values()]
     with pytest.raises(rd.RobotDynError, match="answer_check must be a function"):
         replace(robot, answer_check=8)  # pyright: ignore[reportArgumentType]
@@ -188,13 +188,13 @@ def test_queries_warn_below_the_digits_that_are_set_and_answer_the_same() -> Non
         warnings.simplefilter("error")
         wary = rd.accuracy.warn_below(robot, 13)
         for each in QUANTITIES.values():
-            np.testing.assert_array_equal(each.ask(wary, x), each.ask(robot, x))
+            np.testing.assert_array_equal(each.evaluate(wary, x), each.evaluate(robot, x))
     strict = rd.accuracy.warn_below(robot, 18)
     for each in QUANTITIES.values():
         with pytest.warns(
             rd.PrecisionWarning, match=rf"{each.name} of ur5 has 1[4-7]\.\d digits, fewer than 18"
         ) as seen:
-            each.ask(strict, x)
+            each.evaluate(strict, x)
         assert [warning.filename for warning in seen] == [QUANTITY_FILE]
     with pytest.warns(rd.PrecisionWarning, match="in row [01] of the batch"):
         strict.forward_dynamics(batch, x["v"], x["tau"])
@@ -225,7 +225,7 @@ def test_the_estimate_is_no_less_than_the_error() -> None:
         for seed in range(3):
             x = state(robot, seed)
             for each in QUANTITIES.values():
-                answer = each.ask(robot, x)
+                answer = each.evaluate(robot, x)
                 assert Exact(robot).at(each, x).error(answer) <= _bound(robot, each, x, answer) or not answer.any()
 
 

@@ -411,7 +411,7 @@ def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() 
     more = ladder("Third RK", 2.0, 1.0), ladder("Fourth RK", 1e-8)
     assert list(programs(invented(*other, *own, *more), 1e-8)) == [
         "  robot_dyn DOP853: 2 ms", "  Fourth RK: 1 ms, 0.5 times as long", "  Other RK4: 200 ms, 100 times as long",
-        "  Third: not reached (late)", "  times: least time of prepared runs that take turns",
+        "  Third: not reached (late)", "  times: shortest time of prepared runs that take turns",
     ]  # fmt: skip
     lost = list(programs(invented(ladder("DOP853", 2.0, 1.0, engine="compiled"), *other), 1e-8))
     assert lost[:2] == ["  robot_dyn: not reached (late)", "  Other RK4: 200 ms"]

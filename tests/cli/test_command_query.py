@@ -98,7 +98,7 @@ def test_every_query_of_the_table_is_answered_at_the_state():
     given = ("query", "ur5", "--q", Q, "--v", V, "--a", A, *asked, "--frame", "tool0")
     answers = document(*given)["quantities"]
     for name, quantity in QUANTITIES.items():
-        expected = quantity.ask(robot, state, *["tool0"] * quantity.framed)
+        expected = quantity.evaluate(robot, state, *["tool0"] * quantity.framed)
         assert answers[name] == np.asarray(expected).tolist()
     printed = said(*given)
     assert all(f"{name}, " in printed for name in QUANTITIES)

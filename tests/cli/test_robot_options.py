@@ -51,7 +51,7 @@ def test_masses_give_inertias_from_shapes_and_are_told() -> None:
         done = run("query", "rig.urdf", "--q", "0.3,-0.7", "--json", *given)
         theirs = rd.load("rig.urdf", inertia="from_shapes", **options)  # pyright: ignore[reportArgumentType]
         M = np.array(rd.Plant(theirs).M([0.3, -0.7]))
-        assert done.returncode == 0 and "estimated from shapes, not measured" in done.stderr
+        assert done.returncode == 0 and "estimated from shapes, so torques are rough" in done.stderr
         assert np.array_equal(json.loads(done.stdout)["M"], M)
     told = run("info", "rig.urdf", *by_link).stdout
     assert "estimated: one: collision box" in told and "finding: links 'one', 'two'" in told
@@ -61,3 +61,16 @@ def test_what_is_left_out_of_mjcf_is_told() -> None:
     assert "tendon 'cable': tendons are not supported; left out" in run("info", "rig.xml", "--without", "tendon").stdout
     done = run("show", "rig.xml", "--without", "tendon, equality", "--html", "rig.html")
     assert done.returncode == 0 and "left out" in done.stderr
+
+
+def test_gravity_is_that_of_the_mounted_robot() -> None:
+    """As `with_(gravity=…)`, also before joints are locked; three numbers are needed."""
+    mounted = rd.load("rig.urdf").with_(gravity=(-9.0, 0.5, 2.0))
+    for options, robot, q in (
+        ([], mounted, [0.3, -0.7]),
+        (["--lock", f"{mounted.joint_names[0]}=0.3"], mounted.with_(lock={mounted.joint_names[0]: 0.3}), [-0.7]),
+    ):
+        done = run("query", "rig.urdf", "--q", ",".join(map(str, q)), "--gravity", "-9,0.5,2", "--json", *options)
+        assert np.array_equal(json.loads(done.stdout)["N"], robot.N(np.array(q)))
+    refused = run("query", "rig.urdf", "--gravity", "9.81")
+    assert refused.returncode == 2 and "--gravity" in refused.stderr

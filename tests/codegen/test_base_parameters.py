@@ -15,7 +15,7 @@ from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.origins import slid
 from robot_dyn.lagrange import Linkage, composite_body, magnitudes, newton_euler
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.scene import of_scene, parse_scene
 from tests.long import third
 from tests.random_trees import RandomTree, trees
@@ -59,7 +59,7 @@ def test_of_random_trees_too(tree: RandomTree, seed: int) -> None:
 
 def test_bodies_that_turn_have_no_mass_left() -> None:
     """Of ten numbers seven are left, or less: m, m c along the axis and one moment across it are exactly 0."""
-    linkage = regrouped(slid(Trace(completed(rd.load("panda"))[0]).lagrangian.linkage))
+    linkage = regrouped(slid(Trace(with_exact_right_angles(rd.load("panda"))[0]).lagrangian.linkage))
     for body, inertia in zip(linkage.bodies, linkage.inertias, strict=True):
         if body.revolute:
             axis = int(np.argmax([abs(float(x.constant)) for x in body.axis]))
@@ -72,7 +72,7 @@ def test_bodies_that_turn_have_no_mass_left() -> None:
 
 def test_origins_slide_to_where_distances_vanish() -> None:
     """UR5: shoulder offset 0.13585 and elbow offset −0.1197 lie along parallel axes, so both go on to the wrist."""
-    linkage = rd.Lagrangian(completed(rd.load("ur5"))[0]).linkage
+    linkage = rd.Lagrangian(with_exact_right_angles(rd.load("ur5"))[0]).linkage
     count = [sum(np.count_nonzero(body.pose.p) for body in each.bodies) for each in (linkage, slid(linkage))]
     assert count[1] <= count[0] - 2
     before, after = (each.at(np.zeros(6)).in_base.values() for each in (linkage, slid(linkage)))
@@ -116,7 +116,7 @@ def rpy_of(robot: rd.Robot) -> list[list[float]]:
 def test_right_angles_of_the_ur5_become_exact() -> None:
     """All five, each listed by its joint; others, and all that is not an angle, stay as they are."""
     given = rd.load("ur5")
-    robot, changes = completed(given)
+    robot, changes = with_exact_right_angles(given)
     before, after = rpy_of(given), rpy_of(robot)
     changed = [k for k, pair in enumerate(zip(before, after, strict=True)) if pair[0] != pair[1]]
     assert len(changed) == len(changes) == 5
@@ -125,7 +125,7 @@ def test_right_angles_of_the_ur5_become_exact() -> None:
         for x, y in zip(before[k], after[k], strict=True):
             assert y == round(x / (math.pi / 2)) * (math.pi / 2) if x != y else True
             assert abs(x - y) < 1e-9
-    assert completed(robot) == (robot, ())
+    assert with_exact_right_angles(robot) == (robot, ())
     q = np.linspace(0.2, 1.1, 6)
     assert not np.array_equal(given.M(q), robot.M(q))
     assert np.allclose(given.M(q), robot.M(q), rtol=0, atol=1e-8)
@@ -136,7 +136,7 @@ def test_right_angles_of_the_ur5_become_exact() -> None:
     [("1.570796326", 1), ("1.570796327", 1), ("-1.57079632679", -1), ("3.14159265359", 2), ("4.712388980384", 3)],
 )
 def test_one_unit_of_the_last_digit_of_a_right_angle_is_it(literal: str, right: int) -> None:
-    robot, (change,) = completed(arm(f"0 {literal} 0.3"))
+    robot, (change,) = with_exact_right_angles(arm(f"0 {literal} 0.3"))
     assert rpy_of(robot) == [[0.0, right * math.pi / 2, 0.3]]
     assert str(change).startswith(f"joint 'elbow': rpy 0 {literal} 0.3 taken as right angles")
 
@@ -148,14 +148,14 @@ def test_one_unit_of_the_last_digit_of_a_right_angle_is_it(literal: str, right: 
 def test_an_angle_that_is_only_near_is_left_alone(literal: str) -> None:
     """1e-3 off, too few digits, more than one unit off, all digits there, an exponent, no right angle at all."""
     given = arm(f"{literal} 0 0")
-    robot, changes = completed(given)
+    robot, changes = with_exact_right_angles(given)
     assert robot is given
     assert changes == ()
 
 
 def test_masses_and_translations_are_not_angles() -> None:
     """The same literal as a coordinate of a joint, and in a link's inertial frame, stays."""
-    robot, _ = completed(arm("1.57079632679 0 0"))
+    robot, _ = with_exact_right_angles(arm("1.57079632679 0 0"))
     text = robot.description.xml.decode()
     assert text.count('rpy="1.57079632679 0 0"') == 1
     assert 'xyz="1.57079632679 0 0"' in text
@@ -172,11 +172,11 @@ def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
     runs = rd.rollouts(given, q, duration_s=0.01, method="RK4")
     assert runs.metadata["right_angles"] == words and words in runs[0].summary
     interpreted = rd.simulate(given, **options, engine="interpreted")
-    exact = rd.simulate(completed(given)[0], **options, engine="compiled")
+    exact = rd.simulate(with_exact_right_angles(given)[0], **options, engine="compiled")
     for other in (interpreted, exact):
         assert "right_angles" not in other.metadata and "right angles" not in other.summary
     law = rd.control.PDGravity(given, rd.control.hold([0.3]), kp=5.0, kd=1.0)
-    run = rd.simulate(completed(given)[0], **options, engine="compiled", controller=law)
+    run = rd.simulate(with_exact_right_angles(given)[0], **options, engine="compiled", controller=law)
     assert run.metadata["right_angles"] == words
 
 

@@ -162,7 +162,7 @@ ROBOT = rd.load("planar_2r")
         (lambda: FeedForward(ROBOT, hold([0.0, 0.0]), kp=1.0, kd=[1.0]), r"kd must be one number or of shape \(2,\)"),
         (lambda: gains_from(0.0, 1.0), "inertia_diagonal must be positive"),
         (lambda: PD(MOTION, kp=1.0, kd=1.0, period_s=[]), r"period_s must be one number, got shape \(0,\)"),
-        (lambda: gains_from([1.0, 2.0], [1.0, 2.0, 3.0]), "shapes do not match"),
+        (lambda: gains_from([1.0, 2.0], [1.0, 2.0, 3.0]), "damping_ratio differ"),
     ],
 )
 def test_controllers_without_meaning_are_refused(make, message: str) -> None:

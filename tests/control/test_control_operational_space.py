@@ -241,7 +241,7 @@ FREE = line([0.1, 0.2, 0.3], [0.4, 0.5, 0.6], 1.0)
         ),
         (
             lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, rows=POSE),
-            "which the reference leaves free",
+            "the reference leaves it free",
         ),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, rows=(1, 0)), "rows must be increasing"),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, kp=1.0, kd=1.0, rows=(0.5,)), "rows must be increasing"),

@@ -101,7 +101,7 @@ def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
 
 def test_samples_that_move_at_an_end_need_a_word() -> None:
     """A stop within one step would take a torque that the motion does not need."""
-    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start.*choose .*ends='measured'.*ends='rest'"):
+    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start.*give ends='measured'.*ends='rest'"):
         rd.control.from_samples(ARM, table(SMOOTH))
     with pytest.raises(PlanError, match=r"at the end of the samples: choose"):
         rd.control.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
@@ -124,7 +124,7 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
     (found,) = [
         x for x in rd.control.from_samples(ARM, noisy[kept], time=T[kept], ends="rest").findings if "noise" in x
     ]
-    said = re.search(r"noise or rounding of (\S+) rad, or inexact times, cause accelerations of (\S+) rad", found)
+    said = re.search(r"noise or rounding of (\S+) rad, or inexact times, causes accelerations of (\S+) rad", found)
     assert said is not None and float(said[1]) == pytest.approx(deviation, rel=0.5)
     assert not kept.all() or float(said[2]) == pytest.approx(np.sqrt(6) * deviation / T[1] ** 2, rel=0.35)
     assert "noise" not in " ".join(rd.control.from_samples(ARM, REST[kept], time=T[kept], ends="rest").findings)
@@ -179,7 +179,7 @@ def changed(row: int, joint: int, x: float) -> np.ndarray:
         (
             table(REST) | {"t": 1000 * T + 0.5},
             {},
-            "no joint reaches 1 % of its speed limit in 2000 s, .*are the times in ms",
+            "no joint reaches 1 % of its velocity limit in 2000 s, .*are the times in ms",
         ),
         (table(REST) | {"t": T + (T > 1)}, {}, r"1 gap in time, the longest of 1\.025 s from 1 s"),
         (
@@ -203,7 +203,7 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (table(np.degrees(SMOOTH)), {}, "angles look like degrees: shoulder_pan_joint reaches 48"),
+        (table(np.degrees(SMOOTH)), {}, "angles may be in degrees: shoulder_pan_joint reaches 48"),
         (
             table(np.where(np.arange(6) == 2, np.degrees(SMOOTH), SMOOTH)),
             {},
@@ -221,7 +221,7 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
         (dict(zip(NAMES, REST.T, strict=True)), {}, "there is no column of time; known: shoulder"),
         (table(REST), {"joints": {"elbow": "elbow_joint"}}, "no joint 'elbow'; nearest: elbow_joint"),
         (table(REST), {"ends": "still"}, "no ends 'still'"),
-        ({f"{n} [deg]" if n != "t" else n: x for n, x in table(REST).items()}, {"unit": "rad"}, "states another unit"),
+        ({f"{n} [deg]" if n != "t" else n: x for n, x in table(REST).items()}, {"unit": "rad"}, "states a unit other"),
         (
             {f"{n} [turns]" if n != "t" else n: x for n, x in table(REST).items()},
             {},

@@ -97,7 +97,7 @@ def test_a_tool_that_points_backwards_turns_round() -> None:
 
 def test_a_direction_out_of_reach_is_refused() -> None:
     answer = rd.control.inverse_kinematics(load("ur5"), ([2.0, 0.3, 0.4], [0, 0, -1]), frame="tool0")
-    assert not answer.converged and answer.position_error > 1 and not answer.held_by and answer.conditions == 5
+    assert not answer.converged and answer.position_error > 1 and not answer.limited_by and answer.conditions == 5
 
 
 def reached(name: str, poses: int) -> float:
@@ -178,7 +178,7 @@ def test_the_limit_that_holds_a_joint_is_named() -> None:
     """Joint 2 alone tilts link 3 that far; 0.2 rad are left."""
     arm, answer = answer_at_limit()
     assert not answer.converged and answer.first == 0 and len(answer.solutions) == 0
-    assert any("upper limit of panda_joint2" in each for each in answer.held_by)
+    assert any("upper limit of panda_joint2" in each for each in answer.limited_by)
     assert (arm.lower <= answer.q).all() and (answer.q <= arm.upper).all()
     assert "panda_joint2" in repr(answer) and "does not reach" in repr(answer)
 
@@ -188,7 +188,7 @@ def test_out_of_reach_without_a_limit_is_said() -> None:
     g = arm.placement(np.full(6, 0.3), "tool0").copy()
     g[:3, 3] = [2.0, 0.3, 0.4]
     answer = rd.control.inverse_kinematics(arm, g, frame="tool0")
-    assert not answer.converged and not answer.held_by and "no joint limit is active" in repr(answer)
+    assert not answer.converged and not answer.limited_by and "no joint limit is active" in repr(answer)
     assert answer.position_error > 1
 
 

@@ -238,7 +238,7 @@ def test_references_are_copied_and_frozen() -> None:
         (lambda: via_points([0.0], POINTS[:1]), "at least 2 are needed"),
         (lambda: PiecewisePolynomial([0.0, 1.0], [1.0]), "coefficients must have shape"),
         (lambda: line(Q0, Q1, 1.0, rotation=np.ones((3, 3))), "rotation must be a rotation matrix"),
-        (lambda: line(Q0, Q1, 1.0, rotation_end=np.eye(3)), "needs a rotation to start from"),
+        (lambda: line(Q0, Q1, 1.0, rotation_end=np.eye(3)), "needs rotation, the orientation"),
         (lambda: circle(Q0, 1.0, [0, 0, 0], 1.0), "normal must not be zero"),
         (lambda: circle(Q0, 1.0, [0, 0, 1], 1.0, toward=[0, 0, 2]), "toward, in the plane of the circle, must not"),
         (lambda: circle(Q0, -1.0, [0, 0, 1], 1.0), "radius must be positive"),

@@ -125,7 +125,7 @@ def test_stops_plans_and_inverse_kinematics_keep_a_follower_within_its_limits() 
     # at q = 0.09 the follower would be at 0.17
     answer = inverse_kinematics(arm, arm.placement([0.09], "l_f"), frame="l_f")
     assert arm.lower[0] <= answer.q[0] <= arm.upper[0]
-    assert answer.held_by
+    assert answer.limited_by
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")

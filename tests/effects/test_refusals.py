@@ -94,7 +94,7 @@ IN_A_PLANT = [
     (lambda: plant(SeriesElastic(0.0, 0.1)), "series_elastic: stiffness is 0 for all joints"),
     (lambda: plant(LineSpringDamper("left_tol", None, **LINE), arm=TREE), "line_spring_damper: no frame 'left_tol'"),
     (lambda: plant(CarriedPayload(rd.Payload("tipp", 1.0))), "carried_payload: .*'tipp'"),
-    (lambda: plant(BODY, arm=rd.Lagrangian(ARM)), "carried_payload: needs a Robot, got Lagrangian"),
+    (lambda: plant(BODY, arm=rd.Lagrangian(ARM)), "carried_payload needs a Robot, got Lagrangian"),
     (lambda: setup(SeriesElastic({"joint_2": 9.0}, 1.0), SOFT), "joint 'joint_2' has two drives; keep one"),
     (lambda: setup(PLAY, SOFT), "joint 'joint_1' has two drives"),
 ]

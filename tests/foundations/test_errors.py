@@ -22,7 +22,7 @@ from robot_dyn.integrate import METHODS
 from robot_dyn.simulation import Outcome, Reason
 from tests.wrong_arguments import Example
 
-OPTIONAL = ("peers", "live", "video")  # need packages that may be absent
+OPTIONAL = ("peers", "video")  # need packages that may be absent
 OF_TYPE = {"bool": True, "str": "joint_1", "float": 0.25, "int": 3, "Any": 0.25, "Scalar": 0.25, "tuple": ("effect", 0)}
 OF_TYPE["Outcome"] = Outcome(Reason.STATE_OVERFLOWS, 0.25, "joint_1", {"largest": 1e200})
 MASSLESS = (

@@ -102,6 +102,19 @@ def test_a_list_of_states_by_joint_is_a_batch() -> None:
     )
 
 
+def test_states_of_a_list_may_be_by_name_or_in_order() -> None:
+    rows = [{FIRST: 0.1}, [0.3, 0.4], {SECOND: 0.2}]
+    array = np.array([[0.1, 0.0], [0.3, 0.4], [0.0, 0.2]])
+    np.testing.assert_array_equal(ARM.N(rows), ARM.N(array))
+    for plan in (
+        lambda points: rd.control.via_points([0.0, 0.5, 1.0], points, joint_names=NAMES),
+        lambda points: rd.control.from_samples(ARM, points, time=[0.0, 0.5, 1.0]).reference,
+    ):
+        np.testing.assert_array_equal(motion(plan(rows)), motion(plan(array)))
+    with pytest.raises(QueryError, match=r"q\[1\] must have shape \(2,\)"):
+        ARM.N([{FIRST: 0.1}, [0.3]])
+
+
 def test_a_row_without_joints_and_rows_of_several_shapes_are_refused() -> None:
     with pytest.raises(QueryError, match=r"q\[2\]: no joint is named"):
         ARM.N(ROWS)

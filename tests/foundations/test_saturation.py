@@ -181,5 +181,5 @@ def test_thresholds_of_the_actuation_are_for_bounds() -> None:
 
     with pytest.raises(EffectError, match="odd: only bounds"):
         rd.simulate(rd.Plant(ARM, [Odd()]), START)
-    with pytest.raises(EffectError, match="set only one of"):
+    with pytest.raises(EffectError, match="set at most one of"):
         rd.effects.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True, of_velocity=True)

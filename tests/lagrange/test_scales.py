@@ -138,5 +138,5 @@ def test_compare_says_what_it_cannot_compare() -> None:
     text = chain("", body(2.5, moments=(0.0003, 0.03, 0.03), ixy="1e6"), axes=("0 1 0", "0 0 1"))
     robot = rd.Robot(check(text.encode(), "indefinite"))
     result = rd.compare(robot, samples=6)
-    assert result.notes[0] == "forward dynamics is not compared at 4 of 6 states, where M is not positive definite"
+    assert result.notes[0] == "forward dynamics not compared at 4 of 6 states, where M is not positive definite"
     assert result.ok

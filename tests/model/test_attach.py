@@ -90,6 +90,55 @@ def test_two_texts_are_the_same_robot_as_one_written_by_hand(tmp_path: Path) -> 
         assert np.array_equal(one.upper, robot.upper)
 
 
+TOOLS = {
+    "one link": """<link name="plate"><inertial><origin xyz="0.01 0.02 0.05" rpy="0.3 0.1 -0.2"/><mass value="0.7"/>
+<inertia ixx="0.002" iyy="0.003" izz="0.004" ixy="0.0003" ixz="-0.0002" iyz="0.0001"/></inertial></link>""",
+    "fixed links": """<link name="plate"><inertial><origin xyz="0 0 0.01"/><mass value="0.2"/>
+<inertia ixx="0.001" iyy="0.001" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="torch"><inertial><origin xyz="0.1 0 0.2"/><mass value="0.5"/>
+<inertia ixx="0.004" iyy="0.003" izz="0.002" ixy="0.0001" ixz="0" iyz="0"/></inertial></link><link name="nozzle"/>
+<joint name="bolt" type="fixed"><parent link="plate"/><child link="torch"/><origin xyz="0 0.03 0.1" rpy="0.4 0.2 1"/>
+</joint><joint name="end" type="fixed"><parent link="torch"/><child link="nozzle"/><origin xyz="0 0 0.3"/></joint>""",
+}
+
+
+@pytest.mark.parametrize("arm", ["ur5", "panda", "xarm7", "kinova", "planar_2r"])
+@pytest.mark.parametrize("kind", TOOLS)
+def test_a_tool_without_joints_is_that_of_one_file_merged_by_hand(arm: str, kind: str, tmp_path: Path) -> None:
+    """M, N and the placements of the tool's frames; in a scene and after `to_urdf` too."""
+    bare = rd.load(arm)
+    frame = bare.frame_names[-1]
+    (tmp_path / "tool.urdf").write_text(f'<robot name="tool">{TOOLS[kind]}</robot>')
+    mount = f"""<joint name="mount" type="fixed"><parent link="{frame}"/><child link="plate"/>
+<origin xyz="{" ".join(map(str, XYZ))}" rpy="{" ".join(map(str, RPY))}"/></joint></robot>"""
+    file = bare.description.text.decode().rpartition("</robot>")[0]
+    merged = of_text(file + TOOLS[kind] + mount, bare.description.source)
+    both = bare.attach(tmp_path / "tool.urdf", frame=frame, xyz=XYZ, rpy=RPY)
+    (tmp_path / "scene.toml").write_text(
+        f'robot = "{arm}"\nduration_s = 0.02\n[[attach]]\nrobot = "tool.urdf"\nframe = "{frame}"\n'
+        f'xyz_m = {list(XYZ)}\nrpy_rad = {list(RPY)}\n[[effect]]\nkind = "gravity"\n'
+    )
+    of_scene = rd.read_scene(tmp_path / "scene.toml").plant.dynamics
+    q = np.random.default_rng(3).uniform(-1, 1, bare.n)
+    for robot in (both, of_scene, rd.load(both.to_urdf(tmp_path / "both.urdf")), rd.Lagrangian(both)):
+        np.testing.assert_allclose(robot.M(q), merged.M(q), rtol=0, atol=1e-12 * np.abs(merged.M(q)).max())
+        np.testing.assert_allclose(robot.N(q), merged.N(q), rtol=0, atol=1e-12 * max(np.abs(merged.N(q)).max(), 1.0))
+        for link in {*merged.frame_names} - {*bare.frame_names}:
+            np.testing.assert_allclose(robot.placement(q, link), merged.placement(q, link), rtol=0, atol=1e-12)
+    assert both.n == bare.n and both.total_mass == pytest.approx(bare.total_mass + 0.7, rel=1e-14)
+
+
+def test_a_file_of_a_gripper_is_attached_like_the_robot_that_load_returns(tmp_path: Path) -> None:
+    arm, gripper = rd.load("ur5"), rd.load("planar_2r")
+    both = arm.attach("planar_2r", frame="tool0", prefix="g_")
+    assert both.description.xml == arm.attach(gripper, frame="tool0", prefix="g_").description.xml
+    (tmp_path / "bad.urdf").write_text(
+        '<robot name="bad"><link name="t"><inertial><mass value="1"/></inertial></link></robot>'
+    )
+    with pytest.warns(rd.ModelWarning, match="g_t|'t'"):
+        arm.attach(tmp_path / "bad.urdf", frame="tool0", prefix="g_")
+
+
 def test_edits_of_both_robots_are_kept() -> None:
     arm = of_text(ARM + "</robot>").with_(armature=0.1, payload=rd.Payload("arm", 0.5), mass_scale=1.1)
     gripper = of_text('<robot name="g">' + FINGER.format("", "") + "</robot>")

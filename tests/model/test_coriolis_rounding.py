@@ -15,7 +15,7 @@ import robot_dyn as rd
 from robot_dyn.cross_check import random_state
 from robot_dyn.foundations import DescriptionError
 from robot_dyn.lagrange import magnitudes
-from robot_dyn.model.coriolis import MOST_ROUNDING
+from robot_dyn.model.coriolis import MAX_ROUNDING
 from robot_dyn.model.regrouped import joint_axes, least_inertia, reach, regrouped, rounding
 from tests.lagrange.test_scales import long_chain
 from tests.long import long, stress
@@ -115,12 +115,12 @@ def test_no_diagonal_entry_of_m_is_less_than_its_bound_on_random_trees(tree: Ran
 @pytest.mark.parametrize("name", ["ur5", "panda", "z1"])
 def test_pinocchio_is_asked_where_the_bound_is_small(name: str) -> None:
     coriolis = rd.load(name).coriolis
-    assert coriolis.regrouped is not None and coriolis.rounding <= MOST_ROUNDING
+    assert coriolis.regrouped is not None and coriolis.rounding <= MAX_ROUNDING
 
 
 def test_body_axes_are_taken_where_the_bound_is_not_small() -> None:
     """A chain of links from 1 km to 1 µm."""
-    assert long_chain().coriolis.regrouped is None and long_chain().coriolis.rounding > MOST_ROUNDING
+    assert long_chain().coriolis.regrouped is None and long_chain().coriolis.rounding > MAX_ROUNDING
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "z1", "kinova", "mimic_chain", "skew_tree"])

@@ -13,7 +13,7 @@ from robot_dyn.effects import Force
 from robot_dyn.foundations import DescriptionError, QueryError
 from robot_dyn.foundations.arithmetic import apply
 from robot_dyn.model.newton_euler import JointWrenches
-from robot_dyn.simulation.results.joint_wrenches import COUNTED
+from robot_dyn.simulation.results.joint_wrenches import KNOWN_ON_LINKS
 from tests.effect_examples import EFFECTS
 from tests.user_parts import Push
 
@@ -227,7 +227,7 @@ def test_impacts_at_stops_are_in_no_sample() -> None:
 
 def test_every_effect_of_the_library_acts_at_joints_or_on_links() -> None:
     forces = {kind.name for kind in EFFECTS.values() if issubclass(kind, Force)}
-    assert forces - COUNTED <= {"line_spring_damper"}
+    assert forces - KNOWN_ON_LINKS <= {"line_spring_damper"}
 
 
 def test_effects_with_unknown_forces_on_links_are_refused() -> None:
@@ -256,7 +256,7 @@ def test_too_many_joints_are_refused() -> None:
         f'<joint name="j{i}" type="{"fixed" if i else "continuous"}"><parent link="l{i}"/><child link="l{i + 1}"/>'
         '<axis xyz="0 0 1"/></joint>' for i in range(250)
     )  # fmt: skip
-    with pytest.raises(DescriptionError, match="250 with the fixed ones"):
+    with pytest.raises(DescriptionError, match="250 joints, fixed ones included"):
         rd.Robot.from_text(f'<robot name="long">{links}{joints}</robot>').joint_wrenches([0.0], [0.0], [0.0])
 
 

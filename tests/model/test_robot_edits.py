@@ -124,7 +124,7 @@ def test_edit_without_meaning_is_refused(edit: dict[str, Any], said: str):
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"mass": 1.0, "frame": None}, "payload frame: give the name of a link, got None"),
+        ({"mass": 1.0, "frame": None}, "payload frame: got None; give the name of a link"),
         ({"mass": -1.0}, "payload mass must not be negative"),
         ({"mass": "heavy"}, "payload mass"),
         ({"mass": 1.0, "com": (0, 0)}, "payload com"),

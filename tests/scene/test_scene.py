@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scene_reference
 
 import robot_dyn as rd
 from robot_dyn.foundations import SceneError
@@ -24,7 +25,6 @@ from robot_dyn.scene import (
     starter,
     starter_names,
 )
-from robot_dyn.scene.manual import manual
 from tests.command import run
 from tests.effect_examples import arguments
 from tests.long import long
@@ -115,7 +115,7 @@ DECLARED: dict[str, Any] = {kind: part for kind, part in BY_KIND.items() if kind
 
 def stated(value: Any, known: Any, form: str) -> tuple[str, Any]:
     """A value of an example in TOML: as it is, or by joint, some joints left out; and the value that this means."""
-    if form == "as it is" or not isinstance(value, list) or not known.of_joints:
+    if form == "as it is" or not isinstance(value, list) or not known.is_per_joint:
         return json.dumps(value), value
     required = known.exclusive_minimum is not None and known.fill_value <= known.exclusive_minimum
     joints = [0, 1] if required or form == "by joint" else [int(np.argmax(np.abs(value)))]
@@ -164,7 +164,7 @@ def test_explanation_names_each_term_and_its_source(write) -> None:
     text = repr(of_scene(*read_both(write(starter("panda_payload")))))
     for said in ("N = ∂V/∂q", "mass_kg = 1.5  (scene)", "limit_N_m = urdf  (the robot's file)", "not simulated"):
         assert said in text
-    assert "as it acts: u_max = 87 N m, 87 N m, 87 N m, 87 N m, 12 N m, 12 N m, 12 N m" in text
+    assert "resolved: u_max = 87 N m, 87 N m, 87 N m, 87 N m, 12 N m, 12 N m, 12 N m" in text
 
     absent = text.split("not simulated")[1].split("\n\n")[0]
     assert "viscous_friction" in absent
@@ -192,11 +192,11 @@ stiffness_N_per_m = 30.0
 damping_N_s_per_m = 2.0
 length_m = 0.7
 """
-    said = [line.strip() for line in repr(of_scene(*read_both(write(text)))).splitlines() if "as it acts" in line]
-    assert said[0] == "as it acts: b = 0.8 N s/m, 0.02 N m s/rad"
+    said = [line.strip() for line in repr(of_scene(*read_both(write(text)))).splitlines() if "resolved" in line]
+    assert said[0] == "resolved: b = 0.8 N s/m, 0.02 N m s/rad"
     assert "Lower stop = -1 m, -1 rad; Upper stop = 1 m, none" in said[1] and "k = 10000 N/m, 10000 N m/rad" in said[1]
-    assert said[2] == "as it acts: b = 0.3 N s/m, 0.3 N m s/rad"
-    assert said[3].startswith("as it acts: p = [0.1 0.  0.2] m; p' = [0. 0. 0.] m; k = 30 N/m")
+    assert said[2] == "resolved: b = 0.3 N s/m, 0.3 N m s/rad"
+    assert said[3].startswith("resolved: p = [0.1 0.  0.2] m; p' = [0. 0. 0.] m; k = 30 N/m")
     assert "c = 2 N s/m" in said[3]
 
 
@@ -236,8 +236,8 @@ PARTS = [
 
 
 def test_the_page_is_that_of_the_schema() -> None:
-    command = "python -m robot_dyn.scene.manual > docs/reference/scenes.md"
-    assert PAGE.read_text(encoding="utf-8") == manual(), f"the page is out of date; write it by {command}"
+    command = "python scripts/scene_reference.py > docs/reference/scenes.md"
+    assert PAGE.read_text(encoding="utf-8") == scene_reference.page(), f"the page is out of date; write it by {command}"
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda each: each.__name__)

@@ -55,7 +55,7 @@ def test_what_is_estimated_is_told_by_run_file_and_explanation(tmp_path: Path) -
     run = rd.simulate(rd.read_scene(path))
     again = rd.read(run.save(tmp_path / "run.npz"))
     for text in (run.summary, again.summary, repr(rd.explain(path))):
-        assert "links 'one', 'two': mass or inertia is estimated from shapes, not measured" in text
+        assert "links 'one', 'two': mass or inertia is estimated from shapes, so torques are rough" in text
 
 
 def test_what_is_left_out_of_mjcf_is_told_by_run_file_batch_and_explanation(tmp_path: Path) -> None:

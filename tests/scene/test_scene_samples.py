@@ -68,7 +68,7 @@ def test_what_is_doubtful_is_a_warning(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("heads", "columns", "text", "message"),
     [
-        ("t,joint_1,joint_2", (T, np.degrees(3 * Q)), "", "angles look like degrees: joint_1"),
+        ("t,joint_1,joint_2", (T, np.degrees(3 * Q)), "", "angles may be in degrees: joint_1"),
         ("t,joint_1,joint_2", (T, Q), 'joints = {elbow = "joint_2"}\n', "no joint 'elbow'"),
         ("t,joint_1,joint_2", (T, Q), 'unit = "turns"\n', "unit"),
         ("t,joint_1,joint_2", (T, Q), 'topic = "/joint_states"\n', "applies to MCAP logs"),

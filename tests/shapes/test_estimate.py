@@ -192,7 +192,7 @@ def test_moments_alone_are_estimated_where_the_mass_is_stated(tmp_path: Path) ->
 def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:
     """In its text and findings, in `info`, in the summary of a run, on the page, and in a file that is read again."""
     path = arm(tmp_path, BOX, ROD)
-    with pytest.warns(rd.ModelWarning, match=r"estimated from shapes, not measured"):
+    with pytest.warns(rd.ModelWarning, match=r"estimated from shapes, so torques are rough"):
         robot = estimated(path, total_mass=12.0)
     again = rd.Robot.from_text(robot.description.text).with_(payload=rd.Payload("link2", 1.0))
     assert again.estimated == robot.estimated and len(again.estimated) == 3

@@ -14,7 +14,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.integrate import FIXED_STEP
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.simulation import MachineError, Run, StateEquation, choose
 from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.run.watch import Watch
@@ -23,7 +23,7 @@ from tests.own_method import OwnImplicit
 from tests.user_parts import Push
 
 ARM = rd.load("planar_2r")
-UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
+UR5 = with_exact_right_angles(rd.load("ur5"))[0]  # its file states right angles with too few digits
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
 REFERENCE = rd.control.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")
 CONTROLLERS = {

@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import EffectError, QueryError, TraceError, eigh, tanh
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.simulation.compiled import cache
 from tests.long import long, stress, third
 
@@ -211,7 +211,7 @@ def test_a_reference_of_a_users_own_is_not_taken_for_its_polynomial() -> None:
         rd.simulate(own, engine="compiled")
 
 
-UR5 = completed(rd.load("ur5"))[0]
+UR5 = with_exact_right_angles(rd.load("ur5"))[0]
 START = np.array([0.3, -0.9, 1.2, -0.6, 0.8, 0.2])
 
 

@@ -116,7 +116,7 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
     )
     assert advice.stable
     assert advice.at_period is Stability.MARGINAL
-    assert f"no deviation grows up to a period of {advice.longest_period_s:.3g} s" in advice.text
+    assert f"no deviation grows for periods up to {advice.longest_period_s:.3g} s" in advice.text
     assert radius(advice.longest_period_s) <= 1 < radius(1.001 * advice.longest_period_s)
 
 

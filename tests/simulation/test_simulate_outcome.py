@@ -157,7 +157,7 @@ GOOD = {**START, "duration_s": 0.1}
         ),
         ({"controller": 3}, "controller"),
         ({"method": "rk44"}, "no integration method 'rk44'; nearest: RK4"),
-        ({"method": rd.integrate.Adaptive}, "method: give a name"),
+        ({"method": rd.integrate.Adaptive}, "method: got .*; give a name"),
     ],
     ids=str,
 )

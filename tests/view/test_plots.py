@@ -20,7 +20,7 @@ from robot_dyn import plot
 from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import Doubt, DoubtKind, Ledger, Outcome, Reason
 from robot_dyn.view import PLOTS, PlotError
-from robot_dyn.view.plots.plots import MOST_JOINTS
+from robot_dyn.view.plots.plots import MAX_JOINTS
 from tests.long import long, stress
 from tests.view.plotted import cart_pole, cells, headings, legend, lines, many, stretched, ur5
 
@@ -96,8 +96,8 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run, names: list[str]
 
 
 def test_more_joints_than_a_figure_has_room_for_are_refused(run) -> None:
-    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; select some"):
-        plot(many(run, MOST_JOINTS + 1), "joints")
+    with pytest.raises(PlotError, match=f"1 to {MAX_JOINTS}; select some"):
+        plot(many(run, MAX_JOINTS + 1), "joints")
 
 
 @pytest.mark.parametrize(

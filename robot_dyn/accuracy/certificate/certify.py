@@ -36,7 +36,7 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import M
-from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.quantity import MAX_DIGITS, Quantity
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.result import INTERRUPTED, Result
@@ -85,7 +85,7 @@ class Certificate(Result):
         right_angles: By quantity, digits left after machine code completes the rounded right angles of the file.
         condition: Condition number of M.
         bits: Highest precision of the balls used for the true values.
-        left_out: Implementations and quantities that were left out, with reasons.
+        left_out: Omitted implementations and quantities, with reasons.
         environment: Software versions and processor.
         seed: Seed of the random states.
     """
@@ -131,7 +131,7 @@ class Certificate(Result):
                 "machine code uses exact right angles and is judged by them; against the angles of the file it has"
                 f" {min(self.right_angles.values()):.1f} digits"
             )
-        yield "times of one query from Python, the least of calls that take turns; at most 20 digits are counted"
+        yield "times of one query from Python: the shortest of calls that take turns; at most 20 digits are counted"
 
     def digits_of(self, quantity: str, implementation: str) -> CountedDigits:
         """Return the digits of one quantity by one implementation.
@@ -237,7 +237,7 @@ def certify(
         tau: Torques at this state, (n,), in [N m] or [N]; 0 by default.
         samples: Number of random states.
         seed: Seed of the random states.
-        repeats: Number of timings of each query; queries take turns, and the least time counts.
+        repeats: Number of timings of each query; queries take turns, and the shortest time counts.
         on_progress: Called with the completed fraction, from 0 to 1, and the name of the current task.
 
     Raises:
@@ -286,7 +286,7 @@ def _state(
     if q is None:
         if others:
             name = next(iter(others))
-            raise QueryError(f"{name} needs q; pass q too, or leave out {name}")
+            raise QueryError(f"{name} needs q; pass q too, or omit {name}")
         return None
     state = {name: np.zeros(robot.n) for name in ("v", "a", "tau")}
     for name, x in ({"q": q} | others).items():
@@ -314,7 +314,7 @@ def _count_and_time(
         except QueryError as error:
             left_out.append(str(error))
     bits = digit_count.truth(digit_count.robot, quantity, state).bits
-    name, most = f"balls, {bits} bits", float(MOST_DIGITS)
+    name, most = f"balls, {bits} bits", float(MAX_DIGITS)
     calls[name] = _call(Lagrangian(digit_count.robot, Ball(bits)), quantity, state)
     at_state = None if digit_count.state is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}

@@ -23,7 +23,7 @@ def draw(result: Certificate, theme: str = "light") -> Figure:
         ResultError: If no digits were counted.
     """
     if not result.digits:
-        raise ResultError("no digits were counted, so there is nothing to draw; see left_out")
+        raise ResultError("nothing to draw: no digits were counted; see left_out")
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
     hues = {name: colours["lines"][k % len(colours["lines"])] for k, name in enumerate(result.implementations)}
     panels = figure.subplots(1, len(result.quantities), squeeze=False)[0]

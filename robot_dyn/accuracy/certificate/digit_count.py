@@ -15,7 +15,7 @@ from robot_dyn.accuracy.correct_digits import QUANTITIES, digits_of
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
+from robot_dyn.lagrange.exact import NEGLIGIBLE, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
@@ -26,7 +26,7 @@ from robot_dyn.queries.quantity import Quantity
 from robot_dyn.report.timing import Repeated
 
 FEWER = 250  # random states for each state judged by balls, if no other arithmetic is fine enough; at least 8 states
-_SIDE_BY_SIDE = 8  # states that machine code evaluates together, in the search and in the judgement
+_SIDE_BY_SIDE = 8  # states that machine code evaluates together, in the search and in the count
 LONGDOUBLE = "Lagrangian, longdouble"
 Engine = Robot | Lagrangian | CompiledDynamics | SimpleNamespace  # with a method for each quantity it answers
 
@@ -56,7 +56,7 @@ class Implementation:
 
 
 def evaluate(engine: Engine, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
-    """Return answers at states (S, n), 512 states at a time; nan where there is no answer."""
+    """Return results at states (S, n), 512 states at a time; nan for states without a result."""
     rows = [states[name] for name in quantity.arguments]
     parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
     answer = getattr(engine.nan_rows, quantity.name)
@@ -64,7 +64,7 @@ def evaluate(engine: Engine, quantity: Quantity, states: dict[str, np.ndarray]) 
 
 
 def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
-    """Return the implementations for a robot, and notes on those left out, with reasons."""
+    """Return the implementations for a robot, and notes on omitted ones, with reasons."""
     left_out, quantities = list[str](), tuple(QUANTITIES.values())
     if robot.joint_without_inertia is not None:
         left_out.append(f"forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
@@ -80,7 +80,7 @@ def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
     try:
         compiled = CompiledDynamics(robot)
         for quantity in quantities:
-            quantity.ask(compiled, {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")})
+            quantity.evaluate(compiled, {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")})
         served = tuple(quantity for quantity in quantities if compiled.served_by(quantity.name) != "Pinocchio")
         options.append(Implementation("machine code", compiled.robot, compiled, served))
     except (ImportError, RobotDynError) as error:
@@ -163,7 +163,7 @@ class DigitCount:
             check: Called before each batch of states; an exception that it raises ends the count.
 
         Raises:
-            QueryError: If the implementation has no finite answer.
+            QueryError: If the implementation has no finite result.
         """
 
         def errors(states: Batch) -> np.ndarray:
@@ -176,7 +176,7 @@ class DigitCount:
             sizes = {"parents": 4, "children": 4, "generations": 3}
         sampled = errors(states)
         if np.isnan(sampled).all():
-            raise QueryError(f"{quantity.name} by {implementation.name}: no random state has a finite answer")
+            raise QueryError(f"{quantity.name} by {implementation.name}: no finite result at any random state")
         worst_random = row(states, int(np.nanargmax(sampled)))
         worst, _ = worst_state(states, self._rng, errors, sampled, quantity.arguments, **sizes)
         check()
@@ -210,7 +210,7 @@ class DigitCount:
         return self.truth(implementation.robot, quantity, state).error(answer)
 
     def _errors(self, implementation: Implementation, quantity: Quantity, states: Batch) -> np.ndarray:
-        """Return the errors at states (S, n); nan where there is no answer."""
+        """Return the errors at states (S, n); nan for states without a result."""
         answers = evaluate(implementation.engine, quantity, states)
         if (engine := implementation.fine) is None:
             truths = (self.truth(implementation.robot, quantity, row(states, k)) for k in range(len(answers)))
@@ -251,4 +251,4 @@ def _typical(lagrangian: Lagrangian, states: Batch, quantity: Quantity) -> float
     ratios = evaluate(lagrangian, quantity, states) / entry_units(quantity, evaluate(lagrangian, M, states))
     largest = float(np.nanmax(np.abs(ratios))) or 1.0  # divisor: squares may overflow
     size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
-    return size if size > NOTHING else 1.0
+    return size if size > NEGLIGIBLE else 1.0

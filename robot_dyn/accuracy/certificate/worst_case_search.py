@@ -2,7 +2,7 @@
 
     (μ + λ) evolution strategy: children of the worst states, each moved in some coordinates by steps of many sizes
 
-Rounding errors jump from state to state, so there is no gradient to follow. States are exact in float32, so no
+Rounding errors jump from state to state, so gradients are useless. States are exact in float32, so no
 arithmetic rounds its inputs. The search stays within the range of the random states. [Beyer and Schwefel, Evolution
 strategies, Natural Computing 1, 2002]
 """

@@ -1,7 +1,7 @@
 """Comparison of two versions of a computation, or of a part on and off: instructions counted, times in turns.
 
-ratio = first / second, of the least times. The spread is computed from the ratios within a turn, because both versions
-of a turn run at the same machine speed.
+ratio = first / second, of the shortest times. The spread is computed from the ratios within a turn, because both
+versions of a turn run at the same machine speed.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class Cost(Result):
         robot: Name of the robot.
         acting: Descriptions of gravity, effects and control.
         alternatives: The comparisons of two versions.
-        left_out: Comparisons that were left out, with reasons.
+        left_out: Omitted comparisons, with reasons.
         environment: Software versions and processor.
         budget_s: Time budget, in [s].
         spent_s: Time spent, without compiling, in [s].
@@ -63,11 +63,11 @@ class Cost(Result):
     spent_s: float
 
     def tables(self) -> Iterator[Block]:
-        """A line for each comparison, grouped by unit of work, and notes."""
+        """One line per comparison, grouped by unit of work, and notes."""
         yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
         headings = ("per", "difference", "first / second", "instructions", "ratio", "time", "ratio")
         yield Table(headings, tuple(map(tuple, cost_rows(self))), right=headings[3:])
-        yield "instructions are exact; times are the least processor times over turns, in machine code on one thread;"
+        yield "instructions are exact; times are the shortest processor times over turns, machine code on one thread;"
         yield "± half the interquartile range of the ratios within a turn; ~ a time that varied by over 5 %"
 
     def comparison(self, name: str) -> ABComparison:
@@ -112,8 +112,8 @@ class Cost(Result):
         time = f", {format_duration(on.time_s)}" if on.times else ""
         counts = {"rigid bodies": off.instructions, **self.parts}
         terms = [f"{name} {count}".replace(" -", " −") for name, count in counts.items()]
-        terms += [f"several of these together {self.shared}"] * (self.shared > 0)
-        terms += [f"minus {-self.shared} that several of these count"] * (self.shared < 0)
+        terms += [f"interactions of these parts {self.shared}"] * (self.shared > 0)
+        terms += [f"minus {-self.shared} that several parts share"] * (self.shared < 0)
         return f"a step of RK4 takes {on.instructions} instructions{time}: {', '.join(terms)}"
 
 
@@ -130,14 +130,14 @@ def cost(
     """Measure instructions and time of gravity, effects and control, each on and off, and of alternative algorithms.
 
     Parts are compared in a step of RK4 in machine code; the method of a setup is not used. Times are processor times,
-    so that other programs on the machine matter little.
+    which depend little on other programs.
 
     Args:
         system: A setup, or a plant or robot with a start.
         q0: Initial position, (n,), in [rad] or [m]; required unless `system` is a setup.
         v0: Initial velocity, (n,), in [rad/s] or [m/s]; by default that of the setup, or 0.
         controller: Controller, see `Setup`; by default that of the setup, or none.
-        budget_s: Time budget, compiling not included, in [s].
+        budget_s: Time budget without compiling, in [s].
         repeats: Largest number of timings of each version, while the budget lasts.
         on_progress: Called with the time spent, in [s], and the name of the current task.
 
@@ -168,7 +168,7 @@ def cost(
 
 
 def _comparisons(setup: Setup) -> Iterator[tuple[str, Callable[[], list[ABComparison]]]]:
-    """Return the names of all comparisons, with functions that make them."""
+    """Yield the names of all comparisons, with functions that compute them."""
     yield "parts", lambda: list(step_cost.pairs_of_parts(setup))
     yield step_cost.NUMBERS, lambda: [step_cost.numbers(setup)]
     yield step_cost.SIDE_BY_SIDE, lambda: [step_cost.side_by_side(setup)]

@@ -30,7 +30,7 @@ def draw(result: Cost, theme: str = "light") -> Figure:
         ResultError: If nothing was counted.
     """
     if not result.alternatives:
-        raise ResultError("nothing was counted, so there is nothing to draw; see left_out")
+        raise ResultError("nothing to draw: nothing was counted; see left_out")
     parts = _parts(result)
     others = [pair for pair in result.alternatives if pair.group != "parts"]
     height = _HEIGHT + _ROW * max(len(parts), len(others))
@@ -47,7 +47,7 @@ def _caption(result: Cost) -> str:
     versions = [version for pair in result.alternatives for version in (pair.first, pair.second) if version.times]
     hollow = "" if all(version.repeatable for version in versions) else " Hollow: timing varied by over 5 %."
     return (
-        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times: least processor time over turns."
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times: shortest processor time over turns."
         f"{hollow} {programs(result.environment, 'llvmlite', 'casadi')}."
     )
 

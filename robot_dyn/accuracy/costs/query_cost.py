@@ -23,7 +23,7 @@ from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Trace
 from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.model.right_angles import completed
+from robot_dyn.model.right_angles import with_exact_right_angles
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.timing import seconds
 
@@ -47,7 +47,7 @@ class QueryCost:
 
     @cached_property
     def _trace(self) -> Trace:
-        return Trace(completed(self.robot)[0])
+        return Trace(with_exact_right_angles(self.robot)[0])
 
     @cached_property
     def _forward(self) -> dict[str, ca.Function]:
@@ -56,12 +56,12 @@ class QueryCost:
 
     @cached_property
     def _best(self) -> tuple[ca.Function, Program]:
-        """Forward dynamics of the fewest instructions, and its program."""
+        """Forward dynamics with the fewest instructions, and its program."""
         programs = [(function, program_of(function)) for function in self._forward.values()]
         return min(programs, key=lambda pair: len(pair[1]))
 
     def pairs(self) -> Iterator[tuple[str, Callable[[], ABComparison]]]:
-        """Return the names of the comparisons, with functions that make them.
+        """Yield the names of the comparisons, with functions that compute them.
 
         Such a function raises QueryError if the comparison is not possible on this arm.
         """
@@ -104,8 +104,8 @@ class QueryCost:
         return differences, self._version("exact", self._quantity(_DERIVATIVES), (3, n, n))
 
     def _right_angles(self) -> tuple[Version, Version]:
-        if not completed(self.robot)[1]:
-            raise QueryError("the file states all of them to full precision")
+        if not with_exact_right_angles(self.robot)[1]:
+            raise QueryError("the file states all right angles to full precision")
         stated = program_of(Trace(self.robot).quantity(_FORWARD).function)
         return self._version("as stated", stated), self._version("exact", self._best[1])
 
@@ -125,7 +125,7 @@ class QueryCost:
 
         def run() -> float:
             if len(program) > _MAX_TIMED:
-                raise RobotDynError(f"{len(program)} instructions, more than {_MAX_TIMED}, take long to compile")
+                raise RobotDynError(f"{len(program)} instructions, more than {_MAX_TIMED}, take too long to compile")
             if kernel.many(inputs, y) is not Status.FINE:
                 raise RobotDynError("it has no reliable result at some random state")
             return seconds(lambda: kernel.many(inputs, y), _MIN_LOOP_S, process_time) / STATES

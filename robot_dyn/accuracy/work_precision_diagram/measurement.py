@@ -69,7 +69,7 @@ class Walk:
 def measure(
     candidates: Iterable[MethodUnderTest], reference: Reference, budget: Budget, repeats: int
 ) -> tuple[tuple[ToleranceLadder, ...], list[str]]:
-    """Run the ladders of all candidates and repeat their runs; return the ladders, and notes on those left out.
+    """Run the ladders of all candidates and repeat their runs; return the ladders, and notes on omitted ones.
 
     A run is repeated until its time settles, up to `repeats` times.
     """
@@ -113,7 +113,7 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> str:
             late += 1
             if late == _MAX_LATE or any(isfinite(point.error) for point, _ in walk.runs):
                 return f"a run with {method.by} {setting:.3g} takes more than {_HARD * longest:.2g} s"
-            # otherwise continue: with steps that are too long, the computed motion itself may take longer to integrate
+            # otherwise continue: with too long steps, the computed motion itself may take longer to integrate
         except RobotDynError as error:
             return str(error)
     return "there is no finer setting"

@@ -22,7 +22,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.model.right_angles import completed, models_in_full
+from robot_dyn.model.right_angles import with_exact_models, with_exact_right_angles
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.time_budget import Budget
@@ -40,9 +40,9 @@ _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
 _MORE = 1.1  # ratio of steps: if smaller, stability rather than accuracy chose the steps
 _ABOVE = 10.0  # times the reference error: below this, an error is partly that of the reference
 RECORDS = 25  # approximate number of times at which errors are evaluated
-_MOST_RECORDS = 400  # limit where records must fall on switching times
+_MAX_RECORDS = 400  # limit where records must fall on switching times
 _ON_TIME = 1e-9  # fraction of the record period: times that differ by less are equal
-_MOST_STEPS = 10**8
+_MAX_STEPS = 10**8
 _HIGH = 5  # from this order on, doubling the steps leaves gaps in a ladder
 _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # steps per record period in runs that load machine code
@@ -157,7 +157,7 @@ class ToleranceLadder(Method):
         errors = np.maximum([p.error for p in finite], self.floor)
         errors = np.maximum.accumulate(errors[::-1])[::-1]
         times = np.array([p.time_s for p in finite])
-        times = np.minimum.accumulate(times[::-1])[::-1]  # a finer run that took less serves as well
+        times = np.minimum.accumulate(times[::-1])[::-1]  # a finer run that took less time counts, too
         reached = np.flatnonzero(errors <= error)
         if len(reached):
             i = int(reached[0])
@@ -216,9 +216,9 @@ def whole(setup: Setup) -> Setup:
 
     Both engines then run the same equations.
     """
-    controller = models_in_full(setup.controller, lambda model: completed(model)[0])
+    controller = with_exact_models(setup.controller, lambda model: with_exact_right_angles(model)[0])
     dynamics = setup.plant.dynamics
-    robot = completed(dynamics)[0] if isinstance(dynamics, Robot) else dynamics
+    robot = with_exact_right_angles(dynamics)[0] if isinstance(dynamics, Robot) else dynamics
     plant = setup.plant if robot is dynamics else Plant(robot, setup.plant.effects)
     return replace(setup, plant=plant, controller=controller)
 
@@ -242,13 +242,13 @@ def _record_period(setup: Setup, duration_s: float) -> float:
     times = [Fraction(str(t)) for t in (tick or duration_s, *inside)]
     unit = lcm(*(t.denominator for t in times))
     parts = Fraction(gcd(*(int(t * unit) for t in times)), unit)  # the longest time that divides all
-    if duration_s > _MOST_RECORDS * parts:
+    if duration_s > _MAX_RECORDS * parts:
         parts = Fraction(str(duration_s))  # only records that happen to be ends of steps count
     return float(parts) / ceil(RECORDS * float(parts) / duration_s)
 
 
 def common(t: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return the index of each time t in the ascending times `of`; −1 for a time that is not among them."""
+    """Return the index of each time t in the ascending `times`; −1 for a time that is not among them."""
     place = np.clip(np.searchsorted(times, t - _ON_TIME * times[-1] / len(times)), 0, len(times) - 1)
     return np.where(np.abs(times[place] - t) <= _ON_TIME * times[-1], place, -1)
 
@@ -286,8 +286,8 @@ def at_setting(setup: Setup, setting: float) -> Setup:
 
 
 def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
-    """Return steps from the record period downwards, while a run does not exceed the number of steps allowed."""
-    before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # beyond MOST_CUT events end no steps
+    """Yield steps from the record period downwards, as long as a run has no more steps than allowed."""
+    before, most = 0, MOST_CUT if events and switches(setup) else _MAX_STEPS  # beyond MOST_CUT events end no steps
     for step in step_ladder(setup.record_every_s, order):
         count = at_setting(setup, step).steps
         if count > most:

@@ -1,12 +1,12 @@
 """Reference solution: two runs by methods of different kinds, with tighter settings than all other runs.
 
-The distance between them is the error of the reference. If they part, as in chaotic motion, the horizon ends there.
+The distance between them is the error of the reference. If they diverge, as in chaotic motion, the horizon ends there.
 Past the horizon, methods are judged by the energy error and the return error:
 
     |q − q₀|   after a run to the end and, with reversed velocity, back to the start
 
-A motion without drive or dissipation returns to its start. Rounding errors grow along the way as the errors of the
-method do: a method with smaller errors returns closer, until only rounding remains. [Hairer, Lubich, Wanner, Geometric
+A motion without drive or dissipation returns to its start. Rounding errors grow along the way like the errors of the
+method: a method with smaller errors returns closer, until only rounding remains. [Hairer, Lubich, Wanner, Geometric
 Numerical Integration, 2nd ed., 2006, V.1]
 """
 
@@ -124,9 +124,8 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
         parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
         if end < _MIN_HORIZON * requested:
             raise HorizonError(
-                f"{first} and {other.description} diverge from each other within {_MIN_HORIZON:g} of the"
-                f" duration, at t = {end:.2g} s: no"
-                " error can be measured; use a shorter run, or a less sensitive start"
+                f"no error can be measured: {first} and {other.description} diverge from each other within"
+                f" {_MIN_HORIZON:g} of the duration, at t = {end:.2g} s; use a shorter run, or a less sensitive start"
             )
         setup = replace(setup, duration_s=end, record_every_s=0.0)
 

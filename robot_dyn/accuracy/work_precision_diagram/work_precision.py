@@ -68,7 +68,7 @@ class WorkPrecision(Result):
         duration_s: The requested duration, in [s].
         reference: The reference solution up to the horizon.
         ladders: The runs of each method in each engine, and of each program.
-        left_out: Methods that were left out, with reasons.
+        left_out: Omitted methods, with reasons.
         environment: Software versions and processor.
         budget_s: Time budget, in [s].
         spent_s: Time spent, without compiling, in [s].
@@ -110,7 +110,7 @@ class WorkPrecision(Result):
             )
 
     def tables(self) -> Iterator[Block]:
-        """The basis, a line for each method, and the runs past the horizon."""
+        """The basis, one line per method, and the runs past the horizon."""
         yield from self.basis
         yield self._table_of_ladders([digits for digits in _DIGITS if 10.0**-digits >= self.reference.error])
         yield "times: least time of prepared runs that take turns; * the least; ( ) extrapolated by the order"
@@ -145,7 +145,7 @@ class WorkPrecision(Result):
         return Table(headings, tuple(rows), right=headings[1:])
 
     def _beyond_horizon(self) -> Iterator[Block]:
-        """Energy and return error past the horizon, a line for each method."""
+        """Energy and return error past the horizon, one line per method."""
         yield ""
         yield f"over the whole {self.duration_s:g} s, where no error can be measured, the finest runs:"
         headings, rows = ("method", "setting", "energy", "there and back"), []
@@ -346,12 +346,12 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
         else:
             ended = dict.fromkeys(ladder.ended for ladder in result.ladders if program_of(ladder) == program)
             yield f"  {program}: not reached ({'; '.join(ended)})"
-    yield "  times: least time of prepared runs that take turns"
+    yield "  times: shortest time of prepared runs that take turns"
     yield from (f"  left out: {note}" for note in result.left_out)
 
 
 def named(result: WorkPrecision, digits: int) -> list[tuple[ToleranceLadder, Price]]:
-    """Return the ladders named in the sentence of a result, with the time that the digits take; empty if none does."""
+    """Return the ladders in the sentence of a result, with the time that the digits take; [] if none can be timed."""
     prices = result.digits(10.0**-digits)
     measured = [ladder for ladder, price in prices if not price.extrapolated]
     if not measured:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @command(FILES)
 def cache(clear: bool = False, as_json: Json = False) -> None:
-    """List or remove the compiled kernels that are kept on disk.
+    """List or remove the compiled kernels stored on disk.
 
     Options:
         clear: Remove them; each is compiled again when needed.
@@ -37,7 +37,7 @@ def cache(clear: bool = False, as_json: Json = False) -> None:
 
 
 def _lines(answer: CacheDocument) -> Iterator[Any]:
-    """The answer as text."""
+    """Yield the answer as text."""
     if answer["folder"] is None:
         yield "no cache: compiled kernels are not stored"
         return

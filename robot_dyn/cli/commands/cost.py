@@ -108,7 +108,7 @@ def advise(scene: Scene, /, as_json: Json = False) -> None:
     It also estimates the error. The exit code is 1 if they are not short enough.
     """
     setup = rd.read_scene(scene)
-    with bar(description="looking at the loop"):
+    with bar(description="analysing the loop"):
         advice = rd.advise(setup)
     show(advice, as_json=as_json)
     if not advice.stable:
@@ -116,7 +116,7 @@ def advise(scene: Scene, /, as_json: Json = False) -> None:
 
 
 def _setup(source: str, q: str | None, v: str | None, duration: float | None, options: RobotOptions) -> rd.Setup:
-    """The setup of a scene file, or of the free swing of a robot."""
+    """Return the setup of a scene file, or of the free swing of a robot."""
     if setup := arguments.scene(source, {"--q": q, "--v": v, "--duration": duration} | options.stated):
         return setup
     import numpy as np

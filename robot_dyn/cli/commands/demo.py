@@ -38,7 +38,7 @@ def demo(output: str = "demo", force: Force = False) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
+        raise QueryError(f"--output {output}: {error.strerror}; give a writable folder") from None
     kinds = (("toml", SCENE, SceneError), ("html", PAGE, ReplayError), ("png", PICTURES, PlotError))
     kinds += (("npz", RUN, RunFileError),)
     files = {end: target(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @command(INSPECTION, "list")
 def list_(as_json: Json = False) -> None:
-    """List the robots that can be named."""
+    """List the robots of the catalog."""
     names = rd.list_robots()
     show([*names], as_json=as_json, document={"robots": names})
 
@@ -80,7 +80,7 @@ def query(
     from robot_dyn.foundations.result import plain
 
     if a is not None and tau is not None:
-        raise QueryError("give --a or --tau, not both: each determines the other")
+        raise QueryError("give --a or --tau, not both; each determines the other")
     setup = arguments.scene(source, {"--effects": effects, "--payload": payload} | options.stated)
     if setup is None:
         robot = options.load(source)

@@ -52,7 +52,7 @@ class PageOptions:
         from robot_dyn.view.page import PAGE, ReplayError
 
         if self.html is not None and self.port is not None:
-            raise QueryError("give --html or --port, not both: a file needs no server")
+            raise QueryError("give --html or --port, not both; a file needs no server")
         return None if self.html is None else target(self.html, PAGE, ReplayError, inputs, self.force)
 
     def write_or_serve(self, page: Page, file: Path | None, content: str) -> None:
@@ -124,7 +124,7 @@ def replay(
     film = None if video is None else _film(video, size or "1280x720", view, runs)
     if film is None and (dark or size is not None or fps is not None):
         raise QueryError(
-            "--dark, --size and --fps apply to a video only; add --video OUT.mp4, or remove them: a page follows the"
+            "--dark, --size and --fps apply to videos only; add --video OUT.mp4, or remove them: a page follows the"
             " dark mode of the browser"
         )
     trajectories = map(arguments.run, runs)

@@ -13,9 +13,9 @@ from robot_dyn.codegen.llvm import numpy_array as arrays
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.python_function import OBJECT, api, function_of
 from robot_dyn.codegen.llvm.vectors import F64, I32, I64
-from robot_dyn.foundations.validate import LEAST_EXACT
+from robot_dyn.foundations.validate import MAX_ROUNDING_ERROR
 
-_LARGEST_NARROW = LEAST_EXACT / float(np.finfo(np.float32).eps)
+_LARGEST_NARROW = MAX_ROUNDING_ERROR / float(np.finfo(np.float32).eps)
 
 
 def write_state_entry(

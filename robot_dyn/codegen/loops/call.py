@@ -82,7 +82,7 @@ class MachineFunction:
 
     @cached_property
     def _note(self) -> str:
-        """Key of the note that its machine code is stored; compilation uses the code and values of that moment."""
+        """Key of the note that the machine code is stored; it depends on the code and values at compile time."""
         return self.key(())
 
     def entry(self, place: Hashable, kinds: Sequence[Kind]) -> tuple[Entry, Kind]:

@@ -20,7 +20,7 @@ from robot_dyn.codegen.loops.values import Scalar, Value, number, word
 if TYPE_CHECKING:
     from robot_dyn.codegen.loops.function import Function
 
-_LEAST = -(2**63)
+_MIN = -(2**63)
 Names = Mapping[type[ast.operator], str]
 _IN_PYTHON: Mapping[type[ast.operator], Callable[[float, float], object]] = MappingProxyType(
     {
@@ -40,7 +40,7 @@ _RELATIONS: Mapping[type[ast.cmpop], str] = MappingProxyType(
 
 
 def scalar(f: Function, value: Value, node: ast.AST) -> Scalar:
-    """Return a value that is a number; refuse any other."""
+    """Return the value if it is a number; otherwise raise the error."""
     if not isinstance(value, Scalar):
         raise f.refused(
             node, "an operation on a value that is not a number", "write it entry by entry, or with a primitive"
@@ -110,7 +110,7 @@ def _of_constants(f: Function, of: type[ast.operator], x: float, y: float, node:
         value = _IN_PYTHON[of](x, y)
     except (ArithmeticError, TypeError, KeyError, ValueError) as error:
         raise f.refused(node, f"an operation on constants ({error})", "correct it") from None
-    if not isinstance(value, bool | float) and not (isinstance(value, int) and _LEAST <= value < -_LEAST):
+    if not isinstance(value, bool | float) and not (isinstance(value, int) and _MIN <= value < -_MIN):
         raise f.refused(node, f"the constant {value}", "use one of 64 bits")
     return number(value)
 
@@ -135,7 +135,7 @@ def _divided(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: as
         f.check(b.icmp_signed("!=", y.ir, zero), node, "an integer is divided by zero")
     if y.const is None or y.const == -1:
         whole = b.and_(
-            b.icmp_signed("==", x.ir, ir.Constant(I64, _LEAST)), b.icmp_signed("==", y.ir, ir.Constant(I64, -1))
+            b.icmp_signed("==", x.ir, ir.Constant(I64, _MIN)), b.icmp_signed("==", y.ir, ir.Constant(I64, -1))
         )
         f.check(b.not_(whole), node, "an integer overflows 64 bits")
     quotient, rest = b.sdiv(x.ir, y.ir), b.srem(x.ir, y.ir)

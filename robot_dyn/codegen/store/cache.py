@@ -1,7 +1,7 @@
 """Compiled kernels on disk: a folder of entries, each with the bytes of one kernel, named by a digest of its origin.
 
-A stored kernel is executed, so an entry is read only from a folder that belongs to you alone and from a file that you
-wrote. The SHA-256 inside it detects damage; it does not prove who wrote the file.
+A stored kernel is executed, so entries are read only from a folder that belongs to you alone and from files that you
+wrote. The SHA-256 inside detects damage; it does not prove who wrote the file.
 
 An entry consists of lines of text and the payload: the format, the SHA-256 of the rest, the key, and a description.
 """
@@ -73,7 +73,7 @@ class Store:
     max_bytes: int = 512 * 2**20
 
     def load(self, key: str) -> bytes | None:
-        """Return the payload saved under `key`; None unless an intact one exists that you own (a bad one is removed).
+        """Return the payload saved under `key`; None if it is missing, or damaged or not yours, which is then removed.
 
         Raises:
             QueryError: If `key` is not a digest.
@@ -162,7 +162,7 @@ def default_store() -> Store | None:
 
 
 def _objection(folder: Path) -> str:
-    """Return why a folder is not trusted, with the remedy; empty if it is trusted or does not exist yet."""
+    """Return the reason why a folder is not trusted, with the remedy; "" if it is trusted or does not exist yet."""
     if not folder.is_absolute():
         return f"is not a full path; {_OTHER}"
     try:

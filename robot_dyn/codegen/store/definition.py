@@ -51,7 +51,7 @@ _FOLLOWS = {
     "__dataclass_params__", "__dict__", "__doc__", "__firstlineno__", "__hash__", "__match_args__", "__module__",
     "__orig_bases__", "__parameters__", "__repr__", "__static_attributes__", "__weakref__", "_abc_impl",
 }  # fmt: skip
-_MOST = 500  # functions and classes
+_MAX = 500  # functions and classes
 
 
 class _UndefinedError(Exception):
@@ -107,7 +107,7 @@ class _Reader:
 
     def _number(self, value: Any) -> str:
         if id(value) not in self._numbers:
-            if len(self._reached) == _MOST:
+            if len(self._reached) == _MAX:
                 raise _UndefinedError
             self._numbers[id(value)] = len(self._reached)
             self._reached.append(value)

@@ -34,7 +34,7 @@ def regrouped(linkage: Linkage) -> Linkage:
 
 
 def _unchanged(body: Body, inertia: Array) -> Array:
-    """Return δ, the part of a body's 𝓜 that its joint's motion neither moves nor turns."""
+    """Return δ, the part of a body's 𝓜 that its joint's motion neither moves nor rotates."""
     moments = inertia[3:, 3:]
     if not body.revolute:
         return _parts(0 * inertia[0, 0], 0 * body.axis, moments)

@@ -9,7 +9,7 @@ from typing import final
 
 import casadi as ca
 
-from robot_dyn.foundations.linear_algebra import judging_regularity
+from robot_dyn.foundations.linear_algebra import in_regularity_check
 
 Node = ca.SX  # 1 × 1
 
@@ -41,7 +41,7 @@ class Condition:
         self.node = node
 
     def __bool__(self) -> bool:
-        return judging_regularity.get() or _decision.get()(self.node)
+        return in_regularity_check.get() or _decision.get()(self.node)
 
     def __and__(self, other: Condition | bool) -> Condition:
         return Condition(ca.logic_and(self.node, truth(other)))

@@ -19,7 +19,7 @@ from robot_dyn.codegen.trace.symbol import Symbol, node, select, symbol
 from robot_dyn.foundations.arithmetic import Arithmetic, Array, Numeral
 from robot_dyn.foundations.errors import TraceError
 
-_MOST_BRANCHES = 64  # each is a copy of the function in the kernel
+_MAX_BRANCHES = 64  # each is a copy of the function in the kernel
 
 
 @final
@@ -155,7 +155,7 @@ def every_branch(function: Callable[[], Array]) -> Array:
     Raises:
         TraceError: If there are more than 64 combinations of outcomes.
     """
-    left = _MOST_BRANCHES
+    left = _MAX_BRANCHES
 
     def follow(decided: list[bool]) -> Array:
         nonlocal left
@@ -170,7 +170,7 @@ def every_branch(function: Callable[[], Array]) -> Array:
         left -= 1
         if left < 0:
             raise TraceError(
-                f"more than {_MOST_BRANCHES} branches; write it with np.where or np.clip, without if, min or max"
+                f"more than {_MAX_BRANCHES} branches; write it with np.where or np.clip, without if, min or max"
             )
         result = yes
         # each condition was taken as true above; now as false, from the last one on

@@ -22,7 +22,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.foundations.errors import QueryError, because
+from robot_dyn.foundations.errors import QueryError, located_message
 from robot_dyn.queries.dynamics import Dynamics
 
 _INTERPRETED = "use the plant itself, or simulate it"
@@ -89,7 +89,7 @@ def whichever_way(name: str, function: Callable[[], Array], of_arm_inside: str =
     except Exception as error:  # user code can raise anything on symbols
         has_robot = isinstance(error, QueryError) and Symbol.__name__ in str(error)  # a query with symbols
         remedy = of_arm_inside if has_robot else REMEDY
-        raise TraceError(f"{name} cannot be compiled ({because(error)}): {remedy}") from error
+        raise TraceError(f"{name} cannot be compiled ({located_message(error)}): {remedy}") from error
 
 
 class Motion(Protocol):
@@ -170,7 +170,7 @@ class _TracedForce(_Torque, Active):
 class _TracedSetValued(_Torque, SetValued):
     """A traced effect that may hold joints, in a mode."""
 
-    rubs, stops, at_rest = map(_inner, ("rubs", "stops", "at_rest"))
+    has_friction, stops, at_rest = map(_inner, ("has_friction", "stops", "at_rest"))
     friction = _method("friction", len)
 
     @property
@@ -218,7 +218,7 @@ class _TracedDrive(_StatefulForce, Drive):
     """A traced drive."""
 
     driven, coupled, speeds = map(_inner, ("driven", "coupled", "speeds"))
-    reaching, added_inertia, power = map(_inner, ("reaching", "added_inertia", "power"))
+    direct_actuation, added_inertia, power = map(_inner, ("direct_actuation", "added_inertia", "power"))
 
 
 class _TracedSetValuedDrive(_TracedDrive, _TracedSetValued):

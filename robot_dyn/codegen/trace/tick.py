@@ -19,7 +19,7 @@ from robot_dyn.codegen.trace.symbolic_plant import symbolic_controller
 from robot_dyn.control.controller import Controller
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import TraceError
-from robot_dyn.model.right_angles import RightAngle, completed
+from robot_dyn.model.right_angles import RightAngle, with_exact_right_angles
 from robot_dyn.model.robot import Robot
 
 
@@ -46,7 +46,7 @@ class TickTrace:
             robot: object = getattr(model, "robot", model)
             if not isinstance(robot, Robot):
                 raise TraceError(f"{name} of {self.controller.name} is a {type(model).__name__}: use a Robot")
-            result[name] = completed(robot)
+            result[name] = with_exact_right_angles(robot)
         return result
 
     @property

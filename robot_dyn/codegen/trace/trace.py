@@ -38,9 +38,9 @@ from robot_dyn.queries.dynamics import QUANTITIES as QUERIES
 from robot_dyn.queries.quantity import Key, Quantity, of_frame
 
 QUANTITIES = EQUATION | {"forward_dynamics_derivatives": FORWARD_DYNAMICS_DERIVATIVES}  # quantities with formulations
-_SOLVED_MOST = 8  # joints in series; beyond, solving M a = τ − … is longer than the articulated-body algorithm
-_DERIVED_MOST = 6  # joints; beyond, C v derived from K is longer, and takes as long to trace as all others together
-_CLOSED_FORM_MOST = 4  # joints; beyond, its O(n³) terms make it the longest formulation, except of C
+_MAX_SOLVED = 8  # joints in series; beyond, solving M a = τ − … is longer than the articulated-body algorithm
+_MAX_DERIVED = 6  # joints; beyond, C v derived from K is longer, and takes as long to trace as all others together
+_MAX_CLOSED_FORM = 4  # joints; beyond, its O(n³) terms make it the longest formulation, except of C
 
 
 def keyed(key: Key) -> Quantity:
@@ -134,9 +134,9 @@ class Trace:
         own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
         articulated = name == "forward_dynamics" and not coupled
         depth = max(len(body.path) for body in own.linkage.bodies) if articulated else 0
-        others = [*(self._of_recursion(name) if depth <= _SOLVED_MOST else ())]
-        others += self._of_energies(name) if depth <= _DERIVED_MOST else ()
-        if name in FORMULAS and (own.n <= _CLOSED_FORM_MOST or name == "C" or not (others or articulated)):
+        others = [*(self._of_recursion(name) if depth <= _MAX_SOLVED else ())]
+        others += self._of_energies(name) if depth <= _MAX_DERIVED else ()
+        if name in FORMULAS and (own.n <= _MAX_CLOSED_FORM or name == "C" or not (others or articulated)):
             arrays = [self.symbols[argument][1] for argument in QUANTITIES[name].arguments]
             yield "closed form", lambda: column(getattr(own, name)(*arrays))
         if articulated:

@@ -20,7 +20,7 @@ from robot_dyn.foundations.coefficients import CoefficientField, check_coefficie
 from robot_dyn.foundations.errors import ControlError
 from robot_dyn.foundations.values import Value
 
-SIGNAL = "signal"  # within a unit, the unit of the signal: rad, rad/s or N m, depending on the line of the block
+SIGNAL = "signal"  # placeholder in a unit: rad, rad/s or N m, depending on the line of the block
 
 
 class Block(Value, ABC):
@@ -42,7 +42,7 @@ class Block(Value, ABC):
     Attributes:
         term: Equation in short form.
         linear: True if the block affects small signals; otherwise linearised loops omit it.
-        rounds: True if the output may jump where the input does not; a class that omits this makes no claim.
+        rounds: True if the output may jump where the input does not.
         random: True if the states are standard normal deviates, redrawn at each tick.
         differentiates: True if it derives the velocity from the measured position, as the first velocity block.
     """
@@ -89,7 +89,7 @@ def name_of(kind: type[Block]) -> str:
 @final
 @dataclass(frozen=True, eq=False)
 class Quantisation(Block):
-    """Rounding to the nearest multiple of a resolution: y = Δ ⌊x/Δ + ½⌋, as by an encoder or a converter.
+    """Rounding to the nearest multiple of a resolution, as in an encoder or a converter: y = Δ ⌊x/Δ + ½⌋.
 
     Attributes:
         resolution: Δ, a scalar or (n,), in the unit of the signal, positive.
@@ -129,7 +129,7 @@ class Noise(Block):
 @final
 @dataclass(frozen=True, eq=False)
 class RateLimit(Block):
-    """Limit on the change of a signal in a period T: y_k = y_{k−1} + min(max(x_k − y_{k−1}, −r T), r T).
+    """Limit on the change of a signal per period T: y_k = y_{k−1} + min(max(x_k − y_{k−1}, −r T), r T).
 
     Torques start at 0.
 

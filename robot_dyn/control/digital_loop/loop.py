@@ -1,11 +1,11 @@
 """The loop of a real controller: measurements are delayed and rounded, commands are delayed and limited.
 
-    q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
+    q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u onwards
 
 The loop is itself a sampled controller: its states z contain the delayed signals and the states of blocks. Whole
 periods of a delay are a queue of signals; the rest of a period is a second instant in each period:
 
-    measured at t_k − τ_m: x_{k−d} of the instants t_k − (τ_m mod T);   acts from t_k + τ_u on: at t_{k+d} + (τ_u mod T)
+    measured at t_k − τ_m: x_{k−d} of the instants t_k − (τ_m mod T);   acts from t_k + τ_u: at t_{k+d} + (τ_u mod T)
 
 [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, sec. 2.3 and ch. 9]
 """
@@ -29,9 +29,9 @@ from robot_dyn.foundations.validate import integer, number
 
 SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # unit of the signal on each line
 LINES = tuple(SIGNALS)
-_LEAST = 1e-6  # smallest distance of two instants, in periods
-_MOST = 1000  # largest delay, in periods: each period adds a state to every joint
-_ROUNDED = 1e-9  # largest rounding of a delay, in periods
+_MIN = 1e-6  # smallest distance of two instants, in periods
+_MAX = 1000  # largest delay, in periods: each period adds a state to every joint
+_ROUNDED = 1e-9  # largest change when a delay is rounded, in periods
 
 
 class Instant(NamedTuple):
@@ -96,13 +96,13 @@ class Loop(Enclosing):
         for line, i, block in self.blocks:
             if block.differentiates and (line, i) != ("velocity", 0):
                 kind = type(block).__name__
-                raise ControlError(f"{line}: {kind} may only be the first block of velocity; move it there")
+                raise ControlError(f"{line}: {kind} must be the first block of velocity; move it there")
             check_joints(block, self.n, f"{line}: ")
             block.check(period_s)
 
     @property
     def blocks(self) -> Iterator[tuple[str, int, Block]]:
-        """Each block, with its line and number."""
+        """The blocks, each with its line and number."""
         return ((line, i, block) for line in LINES for i, block in enumerate(getattr(self, line)))
 
     @cached_property
@@ -149,7 +149,7 @@ class Loop(Enclosing):
         return instants(self.measurement_delay_periods, self.actuation_delay_periods)
 
     @property
-    def differs(self) -> bool:
+    def derives_velocity(self) -> bool:
         """True if the velocity is derived from the measured position."""
         return bool(self.velocity) and self.velocity[0].differentiates
 
@@ -157,7 +157,7 @@ class Loop(Enclosing):
     def places(self) -> dict[str, slice]:
         """Slices of the states in z, by name."""
         n, several = self.n, len(self.ticks) > 1
-        measured = n if self.differs else 2 * n
+        measured = n if self.derives_velocity else 2 * n
         whole = int(self.measurement_delay_periods), int(self.actuation_delay_periods)
         named = {f"{line}.{i}": block for line, i, block in self.blocks}
         sizes = {"controller": self.controller.state_size, "instant": several, "begun": 0}
@@ -222,7 +222,7 @@ def _tick(loop: Loop, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Ar
     i, begun = _instant_of(loop, z), z[loop.places["begun"]]
     if len(begun) and begun[0] < 0.5:
         z = _at_rest(loop, q, v, z)
-    at, fresh = loop.ticks[i], q if loop.differs else np.concatenate([q, v])
+    at, fresh = loop.ticks[i], q if loop.derives_velocity else np.concatenate([q, v])
     states = {name: z[place] for name, place in loop.places.items()}
     states["begun"] = np.ones(len(begun))
     u = states["acting"]
@@ -252,7 +252,7 @@ def _computed(loop: Loop, t: float, fresh: Array, states: dict[str, Array]) -> A
     newest = states["sample"] if len(states["sample"]) else fresh
     measured, states["past"] = shifted(newest, states["past"])
     q = _through(loop, "position", measured[: loop.n], states)
-    v = _through(loop, "velocity", q if loop.differs else measured[loop.n :], states)
+    v = _through(loop, "velocity", q if loop.derives_velocity else measured[loop.n :], states)
     z = states["controller"]
     u = _through(loop, "actuation", loop.controller.torque(t, q, v, z), states)
     states["controller"] = loop.controller.next_state(t, q, v, z)
@@ -273,12 +273,12 @@ def _through(loop: Loop, line: str, x: Array, states: dict[str, Array]) -> Array
 def _at_rest(loop: Loop, q: Array, v: Array, z: Array) -> Array:
     """Return the states of a loop that has always measured q and v, with zero torque."""
     states = {name: z[place] for name, place in loop.places.items()}
-    fresh = q if loop.differs else np.concatenate([q, v])
+    fresh = q if loop.derives_velocity else np.concatenate([q, v])
     for name in ("sample", "past"):
         states[name] = np.concatenate([fresh] * (len(states[name]) // len(fresh)) or [fresh[:0]])
     signals = {"position": q, "velocity": v, "actuation": 0 * q}
     for line, i, block in loop.blocks:
-        if line == "velocity" and i == 0 and loop.differs:
+        if line == "velocity" and i == 0 and loop.derives_velocity:
             signals[line] = signals["position"]
         x, name = signals[line], f"{line}.{i}"
         if not block.random:
@@ -297,10 +297,10 @@ def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant,
     """
     measured, acted = -measurement_delay % 1.0, actuation_delay % 1.0
     parts = sorted({0.0, measured, acted})
-    if (np.diff([*parts, 1.0]) < _LEAST).any():
+    if (np.diff([*parts, 1.0]) < _MIN).any():
         raise ControlError(
             f"measurement_delay_periods = {measurement_delay!r} and actuation_delay_periods = {actuation_delay!r} give"
-            f" two instants less than {_LEAST:g} periods apart; let them coincide, or move them further apart"
+            f" two instants less than {_MIN:g} periods apart; make them equal, or move them further apart"
         )
     return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
 
@@ -308,8 +308,8 @@ def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant,
 def delay(name: str, value: object) -> float:
     """Return a delay in periods, as a whole number if it differs from one only by rounding."""
     periods = number(name, value, error=ControlError)
-    if not 0 <= periods <= _MOST:
-        raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {periods:g}; choose another period")
+    if not 0 <= periods <= _MAX:
+        raise ControlError(f"{name} must be from 0 to {_MAX} periods, got {periods:g}; choose another period")
     return float(round(periods)) if abs(periods - round(periods)) < _ROUNDED else periods
 
 

@@ -31,7 +31,7 @@ class LowPass(Block):
         order: 1 or 2.
     """
 
-    term = "y = x through Butterworth's filter"
+    term = "y = x after a Butterworth filter"
     rounds = False
 
     cutoff_rad_s: CoefficientField = field(metadata=coefficient("rad/s", symbol="ω", exclusive_minimum=0))

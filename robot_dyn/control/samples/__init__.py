@@ -1,4 +1,4 @@
-"""Samples as a motion: read from files, data frames and arrays, joined by a spline, with findings about doubtful ones.
+"""Motions from samples in files, data frames and arrays: a spline through them, and findings about doubtful samples.
 
 measured                            from_samples: from a source to a motion
 spline                              the spline through samples
@@ -7,6 +7,6 @@ other_files                         files of other kinds, refused
 table                               columns by heading, and units of headings
 recorded                            samples in SI units, after a search for the columns of times and joints
 publishers                          two publishers in one log, refused
-turns                               whole turns of continuous joints
+turns                               angles of continuous joints, unwrapped across whole turns
 findings                            doubtful samples
 """

@@ -15,7 +15,7 @@ from robot_dyn.foundations.errors import PlanError
 _GAP = 5  # times the median time between samples
 _DEGREE = np.pi / 180
 _FAR = 1.5  # times the limit: positions beyond may be in degrees
-_TURNS = 4 * np.pi  # [rad]: the same for joints without limits
+_TURNS = 4 * np.pi  # [rad]: the same threshold for joints without limits
 _MANY = 0.1  # fraction of samples faster than the limit from which positions may be in degrees
 _SLOW, _SPEED = 0.01, np.pi  # fraction of the velocity limit (by default π) below which times may be in [ms]
 _WHOLE = 1e-6  # largest distance of times from integers
@@ -37,7 +37,7 @@ def refuse_other_units(table: Recorded) -> None:
     if not table.has_time_unit and np.abs(t - np.round(t)).max() <= _WHOLE and _slow(joined_turns(table).table):
         raise PlanError(
             f"times may be in ms, µs or ns: they are integers, {np.median(table.dt):.6g} apart, and no joint reaches"
-            " 1 % of its speed limit; state the unit in the heading, such as 't [ms]' or 't [s]'"
+            " 1 % of its velocity limit; state the unit in the heading, for example 't [ms]' or 't [s]'"
         )
 
 
@@ -61,7 +61,7 @@ def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterato
             at = velocity.greatest_at_s[i] if velocity.greatest[i] > -velocity.least[i] else velocity.least_at_s[i]
             yield (
                 f"{name} moves at {velocity.largest[i]:.4g} {unit}/s at {at:.6g} s, although its samples are within the"
-                f" limit of {limit:.4g}; lengthen the times, or give more samples"
+                f" limit of {limit:.4g}; slow the motion down, or give more samples"
             )
         if not jumps and not outside:
             for q, t in ((position.least, position.least_at_s), (position.greatest, position.greatest_at_s)):
@@ -91,13 +91,13 @@ def _refuse_degrees(table: Recorded) -> None:
         if len(others):
             remedy += f" if {arm.joint_names[others[0]]} is in degrees, too; else state units, as in '{name} [deg]'"
         raise PlanError(
-            f"angles look like degrees: {name} reaches {far[i]:.4g}, at up to {speed[:, i].max():.4g} per second;"
+            f"angles may be in degrees: {name} reaches {far[i]:.4g}, at up to {speed[:, i].max():.4g} per second;"
             f" {remedy}; give unit='rad' if all are in rad (--unit on the command line)"
         )
 
 
 def _slow(table: Recorded) -> bool:
-    """Return True if a joint moves, but no joint reaches 1 % of its speed limit."""
+    """Return True if a joint moves, but no joint reaches 1 % of its velocity limit."""
     limit = np.where(np.isfinite(table.limit), table.limit, _SPEED)
     moves = (np.ptp(table.q, axis=0) > _MOVES).any()
     return bool(moves and (np.abs(table.speed).max(axis=0) < _SLOW * limit).all())
@@ -113,8 +113,8 @@ def _of_times(table: Recorded, reference: PiecewisePolynomial) -> Iterator[str]:
         )
     if not table.has_time_unit and (len(t) >= DENSE or middle > 1) and _slow(table):
         yield (
-            f"no joint reaches 1 % of its speed limit in {t[-1] - t[0]:.6g} s, and samples are {middle:.4g} s apart:"
-            f" are the times in ms? State the unit in the heading, such as 't [ms]' or 't [s]'"
+            f"no joint reaches 1 % of its velocity limit in {t[-1] - t[0]:.6g} s, and samples are {middle:.4g} s apart:"
+            f" are the times in ms? State the unit in the heading, for example 't [ms]' or 't [s]'"
         )
     start, duration = reference.start_s, reference.end_s - reference.start_s
     if start < 0 or start > max(_LATE_S, _LATE * duration):
@@ -143,12 +143,12 @@ def turned(turns: Turns, i: int) -> Iterator[str]:
 
 
 def _jumps(turns: Turns, i: int) -> Iterator[str]:
-    """Yield findings about steps of a joint that are too fast: whole turns that were not joined, and others."""
+    """Yield findings about steps of a joint that are too fast: whole turns that were not unwrapped, and others."""
     table, unit, limit = turns.table, turns.table.unit(i), turns.table.limit[i]
     speed, whole = np.abs(table.speed[:, i]), turns.steps[:, i] & ~turns.joined[i]
     for steps, jump, remedy in (
         (whole, "jumps by a whole turn", "unwrap the angles if the joint kept turning, for example by numpy.unwrap"),
-        ((speed > limit) & ~whole, "jumps", "correct the sample, or lengthen the times"),
+        ((speed > limit) & ~whole, "jumps", "correct the sample, or slow the motion down"),
     ):
         if count := int(steps.sum()):
             k = int(np.where(steps, speed, 0).argmax())
@@ -171,8 +171,8 @@ def refuse_moving_ends(table: Recorded) -> None:
     """Raise a PlanError if joints move at the ends of dense samples: stopping in one step would need large torques."""
     for end in _ends(table):
         raise PlanError(
-            f"{end}: choose ends='measured' if the samples are part of a longer motion, ends='rest' if the motion stops"
-            " there; --ends on the command line"
+            f"{end}; give ends='measured' if the samples are part of a longer motion, or ends='rest' if the motion"
+            " stops there (--ends on the command line)"
         )
 
 
@@ -187,11 +187,11 @@ def _ends(table: Recorded) -> Iterator[str]:
 
 
 def _noise(turns: Turns) -> Iterator[str]:
-    """Yield a finding about the joint whose acceleration is affected most by noise, if its part exceeds 10 %.
+    """Yield a finding about the joint whose acceleration is affected most by noise, if noise exceeds 10 % of it.
 
     Fourth divided differences of independent errors have an rms of σ times the norm of their weights. At small steps
-    this is large compared with those of a smooth motion. A second divided difference is half an acceleration. Joints
-    whose turns were not joined or are unclear are skipped.
+    this exceeds those of a smooth motion by far. A second divided difference is half an acceleration. Joints whose
+    turns were not unwrapped, or are unclear, are skipped.
     """
     table = turns.table
     if len(table.t) < DENSE:
@@ -210,8 +210,8 @@ def _noise(turns: Turns) -> Iterator[str]:
         unit, others = table.unit(i), int((part > _NOISY).sum()) - 1
         also = f" (and {others} other joint{'s' * (others > 1)})" * bool(others)
         yield (
-            f"{table.arm.joint_names[i]}{also}: noise or rounding of {noise[i]:.1g} {unit}, or inexact times, cause"
-            f" accelerations of {by_noise[i]:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and"
+            f"{table.arm.joint_names[i]}{also}: noise or rounding of {noise[i]:.1g} {unit}, or inexact times, causes"
+            f" accelerations of {by_noise[i]:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and therefore"
             " wrong torques; smooth the samples first, for example by scipy.signal.savgol_filter"
         )
 

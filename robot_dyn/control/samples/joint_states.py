@@ -1,4 +1,4 @@
-"""Logs of ROS 2: messages sensor_msgs/msg/JointState of an MCAP file, as columns by the names of joints.
+"""Logs of ROS 2: messages sensor_msgs/msg/JointState of an MCAP file, as columns by joint name.
 
 Each message lists its joints in its own order. Times are read from the headers (when the joints were measured) or from
 the log (when the messages arrived). They are counted from the first message in integer nanoseconds, without rounding.
@@ -130,14 +130,15 @@ def _of_joints(
             header = int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
         except (AttributeError, TypeError, ValueError) as error:
             raise PlanError(
-                f"{where} lacks the header, names or positions of {_TYPE} ({shorten(str(error))}); the log defines"
-                " another message by that name: record it again"
+                f"{where} lacks the header, names or positions of {_TYPE} ({shorten(str(error))}): the log defines"
+                " another message of that name; record it again"
             ) from None
         omitted |= dict.fromkeys(name for name in names if name not in wanted)
         if not wanted & set(names):
             continue
         if len(position) != len(names) or len(set(names)) < len(names):
-            raise PlanError(f"{where} has {len(position)} positions for {len(set(names))} different names; fix the log")
+            counts = f"{len(position)} positions for {len(set(names))} different names"
+            raise PlanError(f"{where} has {counts}; repair the log")
         row = {name: x for name, x in zip(names, position, strict=True) if name in wanted}
         if rows and row.keys().isdisjoint(rows[0]):
             here, before = (shorten(", ".join(one), 80) for one in (row, rows[0]))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robot_dyn.foundations.validate import JointValues
 
 
-_ROUNDED = 0.01  # fraction of the time between two samples: larger rounding of the times raises an error
+_ROUNDED = 0.01  # largest rounding of the times, as a fraction of the time between two samples
 
 
 def from_samples(
@@ -48,12 +48,13 @@ def from_samples(
     limits, whole turns, positions beyond the limits, noise, and ends that are not at rest.
 
     Angles of a continuous joint are unwrapped if all of them lie within one turn and every step of more than half a
-    turn is, without a whole turn, similar to its neighbours; a finding reports the first such step. Other angles are
-    not changed: whole turns of a joint with limits, or recorded over several turns, are findings.
+    turn becomes similar to its neighbours when a whole turn is removed; a finding reports the first such step. Other
+    angles are not changed: whole turns of a joint with limits, or recorded over several turns, are findings.
 
     Args:
         arm: The robot.
-        source: Path of a CSV file, a data frame, columns by heading in a dict, or an array (m, n) in the order of q.
+        source: Path of a CSV file, a data frame, columns by heading in a dict, an array (m, n) in the order of q, or a
+            list of states, also by joint name, 0 for joints left out.
             Headings are names of joints, with or without a unit, such as "elbow_joint [deg]", or the headings of
             `run.save`, such as "q elbow_joint [rad]". Or the path of an MCAP log (.mcap) with ROS 2 messages
             sensor_msgs/msg/JointState that name the joints; this needs the extra "data".
@@ -61,8 +62,8 @@ def from_samples(
             by default the column "t", "time" or "timestamp", with a unit of s, ms, µs or ns. For a log, "header"
             (when joints were measured) or "log" (when messages arrived), counted from the first message; by default
             "header" if headers have times.
-        joints: Heading, with or without its unit, or name in a log, by joint, if these are not the names of joints;
-            other columns are then ignored. Without it, only columns without numbers are ignored.
+        joints: Heading, with or without its unit, or name in a log, by joint, if headings are not joint names; other
+            columns are then ignored. By default only columns without numbers are ignored.
         unit: "rad" or "deg", for angles without a unit in the heading; "rad" by default, unless they look like degrees.
         ends: "rest", with zero velocity and acceleration at both ends; or "measured", with the velocities and
             accelerations of a run's table if it has them, else not-a-knot. By default "rest", which is an error if 16

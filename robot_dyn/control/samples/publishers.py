@@ -1,4 +1,4 @@
-"""Samples of two publishers in one log: refused, because their rows interleave and belong to no single motion."""
+"""Samples of two publishers in one log: refused, because interleaved rows are not one motion."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from robot_dyn.control.samples.recorded import TWO_PUBLISHERS, Recorded
 from robot_dyn.control.samples.turns import whole_turns
 from robot_dyn.foundations.errors import PlanError
 
-_FEW, _PART = 8, 0.1  # smallest number, and fraction of the samples, that stand apart from both neighbours
+_FEW, _PART = 8, 0.1  # smallest number, and fraction of the samples, that are far from both neighbours
 _APART = 0.01  # [rad] or [m]: smallest distance of the two motions, far above the resolution of encoders
 _BACK = 0.2  # times the step to the other motion: the largest distance of the samples before and after it
-_MOST = 0.8  # smallest fraction of fast steps that lead to the other motion or back
+_MIN_FRACTION = 0.8  # smallest fraction of fast steps that lead to the other motion or back
 _SPEED = np.pi  # [rad/s] or [m/s], for joints without a velocity limit
 _LAG = 2e-3  # [rad] or [m]: smallest step back of a delayed copy, above the resolution of encoders
 _BEND = 0.2  # times that step: the largest second difference within each motion, which noise exceeds
@@ -30,10 +30,10 @@ def refuse_alternating(table: Recorded) -> None:
     apart = (fast[1:] | fast[:-1]) & (np.abs(steps[1:] + steps[:-1]) < _BACK * size) & (size > _APART)
     to_or_back = np.pad(apart, ((0, 1), (0, 0))) | np.pad(apart, ((1, 0), (0, 0)))
     interleaved = apart.sum(axis=0) >= max(_FEW, _PART * len(steps))
-    interleaved &= (fast & to_or_back).sum(axis=0) >= _MOST * fast.sum(axis=0)
+    interleaved &= (fast & to_or_back).sum(axis=0) >= _MIN_FRACTION * fast.sum(axis=0)
     delayed = _delayed(table, fast)
     copied = delayed.sum(axis=0) >= max(_FEW, _PART * len(steps))
-    copied &= delayed.sum(axis=0) >= _MOST * (np.abs(steps[2:-1]) > _LAG).sum(axis=0)
+    copied &= delayed.sum(axis=0) >= _MIN_FRACTION * (np.abs(steps[2:-1]) > _LAG).sum(axis=0)
     apart[1:-1] |= delayed & copied
     for i in np.flatnonzero((interleaved | copied) & table.has_column)[:1]:
         k = int(apart[:, i].argmax())
@@ -48,8 +48,8 @@ def refuse_alternating(table: Recorded) -> None:
 def _delayed(table: Recorded, fast: np.ndarray) -> np.ndarray:
     """Return True where a sample belongs to a copy that is a few steps late, (m − 4, n), from the third on.
 
-    The joint steps back and further on, while every other sample continues one smooth motion. Vibration and way points
-    there and back do the same at even periods, so steps must exceed the limits, or periods alternate.
+    The joint alternates between steps back and forward, while every other sample continues one smooth motion. Vibration
+    and back-and-forth way points do the same at even periods, so steps must exceed the limits, or periods alternate.
     """
     q, gaps = table.q, np.diff(table.t)
     if len(q) < _FEW:

@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 
 # headings other than t and q in the table of a run
-_OF_A_RUN = re.compile(r"([vau]|tau|power|start|desired|tracking error) .*|energy|residual|.* state \d+")
+_RUN_HEADINGS = re.compile(r"([vau]|tau|power|start|desired|tracking error) .*|energy|residual|.* state \d+")
 _LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and its powers do not overflow
 _FEW, _PART = 3, 0.1  # smallest number, and fraction of the samples, whose times go back in two interleaved series
 TWO_PUBLISHERS = "keep the samples of one, or record its topic alone"
 _STEPS = 1e-12, 1e15  # [s]: fifth powers of such steps neither vanish nor overflow
-_NAME_JOINTS = "joints={joint: column}, --joint JOINT=COLUMN on the command line"
+_NAME_JOINTS = "joints={joint: column} (--joint JOINT=COLUMN)"
 
 
 @final
@@ -47,7 +47,7 @@ class Recorded:
         has_column: True for joints with a column, (n,); the others rest at q0.
         has_time_unit: True if the unit of the times is known.
         more: v and a, (m, n), if the table is the export of a run.
-        note: Topic and origin of the times of a log, and columns of texts, which are skipped.
+        note: Topic of a log, origin of its times, and skipped columns of text.
     """
 
     arm: Robot
@@ -74,9 +74,9 @@ class Recorded:
         """Velocity limits of the arm, (n,), inf where its file states none or 0."""
         return np.where(self.arm.velocity_limit > 0, self.arm.velocity_limit, np.inf)
 
-    def unit(self, joint: int, of: str = "rad") -> str:
-        """Return the unit of a quantity of a joint; `of` is its unit for a revolute joint."""
-        return of_joint(of, self.arm.joint_types[joint])
+    def unit(self, joint: int, revolute: str = "rad") -> str:
+        """Return the unit of a quantity of a joint; `revolute` is its unit for a revolute joint."""
+        return of_joint(revolute, self.arm.joint_types[joint])
 
 
 def recorded(
@@ -98,10 +98,14 @@ def recorded(
     heads, t, has_time_unit = _times(table, time, least, str(source) if isinstance(source, str | Path) else "samples")
     at = _joints(arm, heads, joints)
     skipped = [head for head, column in heads.items() if head not in at.values() and is_text(column)]
-    note = "; ".join([table.note] * bool(table.note) + [f"without the texts of {shown(skipped)}"] * bool(skipped))
+    note = "; ".join([table.note] * bool(table.note) + [f"without the text columns {shown(skipped)}"] * bool(skipped))
     absent = [name for name in arm.joint_names if name not in at]
     if absent and (q0 is None or not at):
-        names, rest = ("any joint", "") if q0 is not None else (", ".join(absent), ", or give its rest position in q0")
+        names, rest = (
+            ("any joint", "")
+            if q0 is not None
+            else (", ".join(absent), ", or give its rest position in q0 (--lock JOINT=VALUE)")
+        )
         raise PlanError(f"there is no column of {names}; {nearest(absent[0], heads)}; name it by {_NAME_JOINTS}{rest}")
     rests = np.zeros(arm.n) if q0 is None else _rests(arm, q0)
     q, stated = np.tile(rests, (len(t), 1)), np.ones(arm.n, bool)
@@ -146,7 +150,7 @@ def _times(
         heads = {other: x for other, x in heads.items() if other != head}
     elif isinstance(time, int | float):
         with np.errstate(over="ignore"):  # refused below
-            t = number("time", time, error=PlanError, above=0) * np.arange(m)
+            t = number("time between samples", time, error=PlanError, above=0) * np.arange(m)
     else:
         t = numbers("time", time, (m,), error=PlanError)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -168,14 +172,14 @@ def _times(
 
 
 def _refuse_two_series(t: np.ndarray) -> None:
-    """Raise a PlanError if times that go back and forth are those of two increasing series."""
+    """Raise a PlanError if times alternate between two increasing series."""
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back) < max(_FEW, _PART * len(t)):
         return
     lower, upper = -np.inf, -np.inf  # last time of each series
     for x in t.tolist():
         if x <= lower:
-            return  # no two series
+            return  # not two increasing series
         lower, upper = (lower, x) if x > upper else sorted((x, upper))
     k, pairs = back[0], (np.diff(t)[back] == 0).all()
     fault = "repeat" if pairs else "go back"
@@ -229,7 +233,7 @@ def _joints(arm: Robot, heads: Mapping[str, np.ndarray], joints: Mapping[str, st
     by_joint: dict[str, str] = {}
     for head in heads:
         name = name_of(head)
-        if of_a_run and _OF_A_RUN.fullmatch(name):
+        if of_a_run and _RUN_HEADINGS.fullmatch(name):
             continue
         name = name.removeprefix("q ").strip() if of_a_run else name
         if name not in arm.joint_names and is_text(heads[head]):

@@ -17,7 +17,7 @@ from robot_dyn.control.samples.other_files import refuse_other_files
 from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of
 from robot_dyn.foundations.errors import PlanError, shorten, shown
 from robot_dyn.foundations.files import csv_rows
-from robot_dyn.foundations.validate import numbers
+from robot_dyn.foundations.validate import in_order, numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -28,7 +28,7 @@ class DataFrame(Protocol):
 
     @property
     def columns(self) -> Iterable[object]:
-        """Names of its columns."""
+        """Names of the columns."""
         ...
 
     def to_numpy(self) -> np.ndarray:
@@ -37,9 +37,11 @@ class DataFrame(Protocol):
 
 
 if TYPE_CHECKING:
-    Source = str | Path | ArrayLike | Mapping[str, ArrayLike] | DataFrame
+    from robot_dyn.foundations.validate import JointValues
 
-_MOST_BYTES = 2**28
+    Source = str | Path | JointValues | DataFrame
+
+_MAX_BYTES = 2**28
 _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
 _BAG = "give the .mcap file in it, or a CSV file"
 
@@ -72,7 +74,8 @@ def table_of(
         except Exception:  # a ragged list, or any error in the conversion of an object
             raise PlanError(f"samples: columns must be arrays of one length, got {shown(source)}") from None
     else:
-        rows = numbers("samples", source, ("m", len(joint_names)), error=PlanError)
+        states = in_order("samples", source, joint_names, error=PlanError)
+        rows = numbers("samples", states, ("m", len(joint_names)), error=PlanError)
         columns = dict(zip(joint_names, rows.T, strict=True))
     if by_name and time in TIMES and time not in columns:
         raise PlanError(f"time={time!r} applies to MCAP logs only; remove it")
@@ -100,7 +103,7 @@ def _values(column: Any) -> np.ndarray:
 
 
 def _of_csv(path: str | Path, names: set[str], named_only: bool) -> dict[str, np.ndarray]:
-    """Return the columns of a CSV file by heading; columns without numbers as texts.
+    """Return the columns of a CSV file by heading; columns without numbers as empty texts.
 
     Args:
         path: The file.
@@ -111,7 +114,7 @@ def _of_csv(path: str | Path, names: set[str], named_only: bool) -> dict[str, np
         PlanError: If the file cannot be read, has no samples, or an entry of a named column, or of a column with
             numbers, is not a number; with file and line.
     """
-    lines = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY)
+    lines = csv_rows(path, _MAX_BYTES, PlanError, _REMEDY)
     _, heads = next(lines)
     if wrong := _wrong_headings(heads):
         raise PlanError(f"{path}: {wrong}")

@@ -27,8 +27,8 @@ class Samples(PiecewisePolynomial):
     From positions alone it is a spline of degree 5 with four continuous derivatives (not-a-knot; for fewer than six
     samples, the single polynomial of lowest degree). With velocities it consists of Hermite polynomials of degree 3,
     with velocities and accelerations of degree 5. Integration steps end at the breaks, so methods keep their order;
-    steps are therefore at most as long as the time between samples. The velocity at the ends is not zero in general:
-    for a few way points from rest use `via_points`; for files, or rest at both ends, `rd.control.from_samples`.
+    steps are therefore never longer than the time between samples. The velocity at the ends is not zero in general: for
+    a few way points from rest use `via_points`; for files, or rest at both ends, `rd.control.from_samples`.
 
     Args:
         t: Increasing times, shape (m,), m at least 2, in [s].
@@ -45,7 +45,7 @@ class Samples(PiecewisePolynomial):
     def __init__(self, t: ArrayLike, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None) -> None:
         q = numbers("q", q, ("m", "n"))
         if len(q) < 2:
-            raise ControlError(f"q: at least 2 samples are needed, got {len(q)}; to rest at one position, use hold(q)")
+            raise ControlError(f"q: at least 2 samples are needed, got {len(q)}; use hold(q) to rest at one position")
         t = increasing("t", t, len(q))
         if v is None:
             if a is not None:

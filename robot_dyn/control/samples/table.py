@@ -1,4 +1,4 @@
-"""Tables: columns by heading, a name with a unit in brackets or parentheses: "elbow_joint [deg]" or "t (ms)"."""
+"""Tables: columns by heading, which is a name with or without a unit, such as "elbow_joint [deg]" or "t (ms)"."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def unit_of(heading: str) -> str | None:
 
 
 def is_text(column: np.ndarray) -> bool:
-    """Return True for a column without numbers: texts, truth values, stamps, or nothing but gaps."""
+    """Return True for a column without numbers: texts, truth values, stamps, or only gaps."""
     if column.dtype.kind != "O":
         return column.dtype.kind in "bSUTMm" or (column.dtype.kind == "f" and bool(np.isnan(column).all()))
     return not any(
@@ -52,7 +52,7 @@ def size(heading: str, kind: str, unit: str | None = None) -> tuple[float, bool]
     """Return the unit of a column in SI units, and True if the heading, or `unit` for angles, states it.
 
     Raises:
-        PlanError: If the unit is unknown, or the heading states another one than `unit`.
+        PlanError: If the unit is unknown, or the heading states a unit other than `unit`.
     """
     stated, units = unit_of(heading), UNITS[kind]
     if stated is None:
@@ -60,5 +60,5 @@ def size(heading: str, kind: str, unit: str | None = None) -> tuple[float, bool]
     if stated not in units:
         raise PlanError(f"column {shown(heading)}: the unit must be one of {', '.join(units)}")
     if kind == "angle" and unit and units[unit] != units[stated]:
-        raise PlanError(f"column {shown(heading)} states another unit than unit={unit!r}; remove unit (--unit)")
+        raise PlanError(f"column {shown(heading)} states a unit other than unit={unit!r}; remove unit (--unit)")
     return units[stated], True

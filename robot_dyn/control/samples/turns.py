@@ -1,8 +1,8 @@
 """Whole turns in recorded angles: detection, and angles unwrapped across them.
 
-A driver that reports angles between −π and π subtracts a whole turn when a joint turns through π. Such a step is
-longer than half a turn; without the whole turn it is as long as its neighbours. Angles are unwrapped only if the joint
-is continuous and all its samples lie within one turn; otherwise the recorded motion may be intended.
+A driver that reports angles between −π and π subtracts a whole turn when a joint passes π. Such a step is longer than
+half a turn; without the whole turn it is as long as its neighbours. Angles are unwrapped only if the joint is
+continuous and all its samples lie within one turn; otherwise the recorded motion may be intended.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from robot_dyn.control.samples.recorded import Recorded
 
 _WITHIN = 2 * np.pi + 1e-3  # [rad]: one turn, with ends rounded to 3 decimals
 _LIKE = 0.1  # [rad]: allowed difference of a step without its turn from its neighbours, plus twice their size
-_MOST = np.pi / 2  # [rad]: upper bound of that difference
+_MAX = np.pi / 2  # [rad]: upper bound of that difference
 _FAST = 1.5  # times the velocity limit: the largest speed of a step without its turn
 
 
@@ -65,9 +65,9 @@ def whole_turns(table: Recorded) -> np.ndarray:
     left, right = _neighbours(short, dt)
     pace = np.nan_to_num(np.fmax(np.abs(left), np.abs(right)))
     off = np.fmin(np.abs(short - left), np.abs(short - right))
-    off = np.fmin(off, np.where(pace < _MOST, np.abs(short), np.inf))
+    off = np.fmin(off, np.where(pace < _MAX, np.abs(short), np.inf))
     as_recorded = np.fmin(*(np.nan_to_num(np.abs(moved - step), nan=np.inf) for step in _neighbours(moved, dt)))
-    like = (off <= np.minimum(_LIKE + 2 * pace, _MOST)) & (off < as_recorded / 2)
+    like = (off <= np.minimum(_LIKE + 2 * pace, _MAX)) & (off < as_recorded / 2)
     angles = np.array([kind != "prismatic" for kind in table.arm.joint_types])
     return angles & (np.abs(moved) > np.pi) & (np.abs(count) == 1) & like & (np.abs(short) <= _FAST * table.limit * dt)
 

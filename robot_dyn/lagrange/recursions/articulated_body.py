@@ -70,7 +70,7 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
 def _outward(
     linkage: Linkage, X: list[Step], v: Array, batch: tuple[int, ...]
 ) -> tuple[list[Array], list[Array], list[Array]]:
-    """Return for each body, base to tips: acceleration by rates alone, 𝓜, and the wrench that keeps ω."""
+    """Return for each body, base to tips: the acceleration due to rates alone, 𝓜, and the wrench that keeps ω."""
     zero = np.zeros((*batch, 6), dtype=linkage.gravity.dtype)
     V, bias, inertia, force = twists(linkage, X, v), [], [], []
     for i, body in enumerate(linkage.bodies):

@@ -37,9 +37,9 @@ def accelerations(linkage: Linkage, steps: list[Step], V: list[Array], v: Array,
 
 def carried(body: Body, step: Step, A: Array, omega: Array, v: Array) -> Array:
     """Return A (..., 6) of a body at constant joint rate v (..., 1), from the parent's A (..., 6) and ω (..., 3)."""
-    origin = step.turned(A[..., :3] + apply(_spread(omega, A[..., 3:]), step.origin))
-    alpha = step.turned(A[..., 3:])
-    product = apply(hat(step.turned(omega)), v * body.axis)
+    origin = step.rotated(A[..., :3] + apply(_spread(omega, A[..., 3:]), step.origin))
+    alpha = step.rotated(A[..., 3:])
+    product = apply(hat(step.rotated(omega)), v * body.axis)
     return np.concatenate([origin, alpha + product] if body.revolute else [origin + 2 * product, alpha], axis=-1)
 
 

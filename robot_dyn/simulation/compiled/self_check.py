@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.errors import RobotDynError, because
+from robot_dyn.foundations.errors import RobotDynError, located_message
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.model.right_angles import models_in_full
+from robot_dyn.model.right_angles import with_exact_models
 from robot_dyn.simulation.compiled.cache import robot_to_compile
 from robot_dyn.simulation.compiled.machine_code import STEP, MachineCode, States
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
@@ -83,7 +83,7 @@ def check(code: MachineCode, setup: Setup) -> None:
         MachineError: If the results differ by more than rounding.
     """
     checked, changeable = code.code.checked, code.code.changeable
-    controller = models_in_full(code.compiled_form.controller, robot_to_compile)  # as they are traced
+    controller = with_exact_models(code.compiled_form.controller, robot_to_compile)  # as they are traced
     if controller is not code.compiled_form.controller:
         code = replace(code, compiled_form=replace(code.compiled_form, controller=controller))
     states = next(iter(checked.values()), None)
@@ -116,7 +116,7 @@ def _compare(code: MachineCode, setup: Setup, states: States) -> None:
             raise
         except Exception as error:  # raised by user-defined code
             parts = " or ".join(functions.changeable)
-            raise MachineError(f"{parts} raises at t = {round(t, 9):g} s ({because(error)})") from error
+            raise MachineError(f"{parts} raises at t = {round(t, 9):g} s ({located_message(error)})") from error
         if "jacobian" in results:
             J = results["jacobian"][:, 0].reshape(equation.size + 1, equation.size)
             worst = jacobian_error(equation, t, y[:, 0], at.held(equation, 0), p, J)

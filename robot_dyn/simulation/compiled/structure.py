@@ -145,7 +145,7 @@ class _Description:
         if name == "payload" and isinstance(part, CarriedPayload):  # its numbers are parameters of the arm
             return "payload", value.frame
         if name in (coefficients := declared(type(part))) and path in self.numbered:
-            return value is None or (None if coefficients[name].of_joints else np.shape(value))
+            return value is None or (None if coefficients[name].is_per_joint else np.shape(value))
         return self._of(value, f"{path}.{name}" if path else name)
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot_dyn.effects.effect import Conservative
-from robot_dyn.effects.set_valued import SetValued, impulses_of, in_a_step
+from robot_dyn.effects.set_valued import SetValued, friction_and_bounds, split_impulses
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.convex import PASSES, newton
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError
@@ -41,7 +41,7 @@ def problem(equation: StateEquation, t: float, x: Array, held: Array | None) -> 
     ]
     M = equation.plant.M(q)
     load = sum((torque for _, torque in torques), start=u) - equation.plant.dynamics.inverse_dynamics(q, v, 0 * v)
-    friction, lower, upper, shares = in_a_step(motion.set_valued, q, v)
+    friction, lower, upper, shares = friction_and_bounds(motion.set_valued, q, v)
     working = [torque for force, torque in torques if not isinstance(force, Conservative)]
     rates = np.zeros_like(z)
     if held is None and equation.controller is not None and equation.state_size:
@@ -114,7 +114,7 @@ def after_step(equation: StateEquation, x: Array, solved: Array) -> Array:
     at, works = problem_rows(n).rest - problem_rows(n).M, [h * (vectors["u"] @ mean)]
     smooth = sum(not isinstance(force, SetValued) for force in working)
     rates = numbers[at + n * smooth :][: equation.states - equation.impulses]
-    impulses = impulses_of(motion.set_valued, friction, stops, numbers[at + n * smooth + len(rates) :])
+    impulses = split_impulses(motion.set_valued, friction, stops, numbers[at + n * smooth + len(rates) :])
     for force in working:
         if isinstance(force, SetValued):
             works.append(next(impulses) @ mean)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adaptive
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, MIN_RTOL, STIFF, Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
 from robot_dyn.simulation.observation.remarks import RemarkKind
@@ -70,7 +70,7 @@ def trials(setup: Setup, requested: float) -> Generator[Setup, Trajectory, Traje
     simple, spent = yield from _in_each_segment(setup, requested)
     if simple is not None:
         return simple
-    least, stiff = 1.01 * LEAST_RTOL, _stiff(setup)
+    least, stiff = 1.01 * MIN_RTOL, _stiff(setup)
     method = STIFF if stiff else AUTO
     rtol = max(least, min(_LOOSEST, requested ** _LOOSE[STIFF if stiff else EXPLICIT]))
     tried: list[_Try] = []
@@ -186,7 +186,7 @@ def _refusal(best: _Try, requested: float, rtol: float) -> str:
         why = doubt.text  # its remedy is for a single run
     else:
         method = best.trial.statistics.method
-        least = f"{method}'s smallest tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
+        least = f"{method}'s smallest tolerance" if rtol <= 1.01 * MIN_RTOL else "the tolerance"
         why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"
     remedy = f"use accuracy {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "use a shorter run"
     return f"accuracy {requested:.1e} is not attainable: {why}; {remedy}"

@@ -85,5 +85,5 @@ def bodies_and_effects(run: TrajectoryData) -> tuple[Robot, dict[str, np.ndarray
         raise QueryError("the run contains no accelerations or no actuation; simulate it with rd.simulate")
     robot = robot_of(run)
     if "right_angles" in run.metadata:
-        robot, _ = right_angles.completed(robot)
+        robot, _ = right_angles.with_exact_right_angles(robot)
     return robot, run.effect_torques

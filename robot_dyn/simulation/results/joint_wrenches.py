@@ -25,7 +25,8 @@ _AT_JOINTS = (  # parent and child exert these on each other, so that they are p
     Spring, ViscousFriction, RegularisedCoulombFriction, DryFriction, DahlFriction, LuGreFriction, JointStopSpring,
     JointStopDamper, RigidStops, SeriesElastic, RigidBacklash,
 )  # fmt: skip
-COUNTED = {effect.name for effect in (*_AT_JOINTS, ExternalWrench)}
+KNOWN_ON_LINKS = frozenset(effect.name for effect in (*_AT_JOINTS, ExternalWrench))
+"""Names of effects whose forces on the links are known."""
 
 
 def joint_wrenches_of(run: TrajectoryData, frame: str | None, at: str | None) -> JointWrenches:
@@ -36,7 +37,7 @@ def joint_wrenches_of(run: TrajectoryData, frame: str | None, at: str | None) ->
     """
     robot, exerted = bodies_and_effects(run)
     for name in exerted:
-        if re.sub(r" \d+$", "", name) not in COUNTED:
+        if re.sub(r" \d+$", "", name) not in KNOWN_ON_LINKS:
             raise QueryError(
                 f"joint_wrenches: the forces of the effect {name} on the links are unknown; pass them to"
                 " arm.joint_wrenches(run.q, run.v, run.a, external=…), for an arm with the payload that is carried"

@@ -22,10 +22,10 @@ from robot_dyn.description.edits import Payload
 from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.foundations.extras import version_of
 from robot_dyn.foundations.portable_bits import has_portable_bits
-from robot_dyn.model.findings import reservations
-from robot_dyn.model.right_angles import written_out
+from robot_dyn.model.findings import reading_findings
+from robot_dyn.model.right_angles import right_angle_note
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.simulation.results.acting import frame_of, rotors_of
 from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.setup.settings import settings_of
 from robot_dyn.simulation.setup.setup import Setup
@@ -33,10 +33,12 @@ from robot_dyn.simulation.setup.setup import Setup
 _LISTED = 4  # findings in a summary
 
 
-def origin(dynamics: Dynamics) -> dict[str, str]:
-    """Return the origin of a run as texts: URDF, its path, edits and versions."""
-    robot = getattr(dynamics, "robot", dynamics)
-    texts = {"versions": versions()}
+def origin(setup: Setup, compiled: bool) -> dict[str, str]:
+    """Return the origin of a run as texts: URDF, path, edits, controlled frame, rotors, machine code and versions."""
+    robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
+    texts = frame_of(setup) | rotors_of(setup) | {"versions": versions()}
+    if compiled:
+        texts |= edits_of_machine_code(setup) | ({"bits": "portable"} if has_portable_bits() else {})
     if isinstance(robot, Robot):
         urdf = robot.description.text.decode(errors="replace")
         texts |= {"robot": robot.name, "source": robot.description.source}
@@ -48,13 +50,10 @@ def origin(dynamics: Dynamics) -> dict[str, str]:
 
 def edits_of_machine_code(setup: Setup) -> dict[str, str]:
     """Return the changes of machine code to a setup as texts of a run: right angles of plant and models."""
-    edited_angles = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
+    edited_angles = right_angle_note(
+        setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ())
+    )
     return {"right_angles": edited_angles} if edited_angles else {}
-
-
-def bits_of_machine_code() -> dict[str, str]:
-    """Return "portable" as a text of a run if its machine code is portable."""
-    return {"bits": "portable"} if has_portable_bits() else {}
 
 
 def settings_text(setup: Setup) -> dict[str, str]:
@@ -102,7 +101,7 @@ def portable(source: str, folder: Path) -> str:
 def about_the_robot(run: RunData) -> Iterator[str]:
     """Yield the first estimates, assumptions and omissions of the robot's file as lines, and the number of the rest."""
     with suppress(DescriptionError):
-        findings = reservations(_description(run))
+        findings = reading_findings(_description(run))
         yield from (f"robot: {shorten(finding, 200)}" for finding in findings[:_LISTED])
         if more := findings[_LISTED:]:
             yield f"robot: {len(more)} more findings on its file; rd.info lists them"

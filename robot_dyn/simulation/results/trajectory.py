@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robot_dyn.effects.causes import Causes
-from robot_dyn.foundations.display import MOST_JOINTS, curves, plot
+from robot_dyn.foundations.display import MAX_JOINTS, curves, plot
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.model.newton_euler import JointWrenches
 from robot_dyn.queries.units import joint_units
@@ -151,7 +151,7 @@ class Trajectory(TrajectoryData):
         return save_data(self, path, write_run)
 
     def _repr_html_(self) -> str:
-        joints, types = self.joint_names[:MOST_JOINTS], joint_types(self)
+        joints, types = self.joint_names[:MAX_JOINTS], joint_types(self)
         quantities = {"q": "q", "v": "v"} | ({"u": "tau"} if np.any(self.u) else {})
         plots = [
             plot(f"{name} [{joint_units(like, types)}]", self.t, dict(zip(joints, getattr(self, name).T, strict=False)))

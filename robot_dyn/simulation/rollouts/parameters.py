@@ -81,7 +81,7 @@ def parameters(system: Setup | Plant | Dynamics) -> Parameters:
 def setup_parameter(parameter: Parameter, dynamics: Dynamics) -> SetupParameter:
     """Return a parameter of `robot_dyn.codegen.parameters` with its unit."""
     types = joint_types_of(dynamics)
-    of_joints, value = parameter.declared.of_joints, parameter.value
+    of_joints, value = parameter.declared.is_per_joint, parameter.value
     signal = SIGNALS.get(parameter.name.partition(".")[0], SIGNAL)
     unit = coefficient_unit(replace(parameter.declared, unit=parameter.declared.unit.replace(SIGNAL, signal)), types)
     shape = f"(B,) or (B, {value.size})" if of_joints else f"(B{''.join(f', {n}' for n in value.shape)})"

@@ -66,7 +66,7 @@ def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
     varied = (
         () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.varied)
     )
-    declared = {parameter.name: parameter.declared for parameter in varied if parameter.declared.of_joints}
+    declared = {parameter.name: parameter.declared for parameter in varied if parameter.declared.is_per_joint}
     about = {} if setup is None else {x.name: setup_parameter(x, setup.plant.dynamics).unit for x in varied}
     for name, values in runs.varied.items():
         columns = values.T

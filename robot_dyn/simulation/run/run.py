@@ -147,20 +147,15 @@ class Run:
 
         Return why the last call of the loop ended; or `Stiff` if a stiff method should replace the run.
         """
-        observer, position = self.state.observer, self.state.position
+        observer = self.state.observer
         while True:
             if (stiff := self.steps.detect_stiffness()) is not None:
                 return stiff
             steps = min(budget, self.steps.room(budget))
-            if observer is None:
-                position.budget[0] = steps
-                ended = self.steps.advance()
-            else:
-                position.budget[0] = steps = min(steps, observer.room)
-                position.column[0] = observer.filled
-                ended = self.steps.advance()
-                observer.filled = int(position.column[0])
-                observer.process()
+            if observer is not None:
+                steps = min(steps, observer.room)
+            self.state.position.budget[0] = steps
+            ended = self.state.observed(self.steps.advance)
             budget -= steps
             if ended is not Ended.PAUSED or budget <= 0:
                 return ended

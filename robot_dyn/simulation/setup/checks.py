@@ -114,7 +114,7 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
                 f" {reason};"
                 " use method='DOP853', or 'MoreauJean' with a step_s"
             )
-    if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
+    if method.nonsmooth and (other := [x for x in effects if not (x.has_friction or x.stops)]):
         raise QueryError(f"{other[0].name}: cannot be stepped by {method.name}; use method='DOP853'")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.loop import SIGNALS, Loop
 from robot_dyn.control.reference import Reference
-from robot_dyn.effects.explanation import as_they_act, edit_terms
+from robot_dyn.effects.explanation import acting_coefficients, edit_terms
 from robot_dyn.queries.dynamics import Dynamics
 
 
@@ -26,14 +26,14 @@ def control_lines(controller: Controller, dynamics: Dynamics) -> Iterator[str]:
     """Yield the lines about a controller, its parts, its models and its references."""
     inside = controller.controller if isinstance(controller, Loop) else controller
     yield f"control: {inside.name}, {pace(controller.period_s)}"
-    yield from (f"  {text}" for text in as_they_act([inside], dynamics))
+    yield from (f"  {text}" for text in acting_coefficients([inside], dynamics))
     if isinstance(controller, Loop):
         for name in ("measurement_delay_periods", "actuation_delay_periods"):
             yield f"  {name} = {getattr(controller, name):g}"
     for path, _, part in controller.parts:
         if part is not inside:
             line = path.removeprefix("controller.").partition(".")[0]
-            texts = as_they_act([part], dynamics, SIGNALS.get(line, ""))
+            texts = acting_coefficients([part], dynamics, SIGNALS.get(line, ""))
             yield f"  {line}: {'; '.join((f'{part.name}, {part.term}' if part.term else part.name, *texts))}"
     yield from model_lines(controller, dynamics)
     yield from (f"reference: {type(x).__name__}, {span(x)}" for x in controller.references.values())

@@ -18,7 +18,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import (
-    LEAST_EXACT,
+    MAX_ROUNDING_ERROR,
     JointValues,
     choice,
     duration,
@@ -41,7 +41,7 @@ from robot_dyn.simulation.setup.schedule import LEAST_STEPS, MOST_CUT, ON_STEP, 
 
 ENGINES = ("auto", "interpreted", "compiled")
 MOST_BYTES = 8 * 2**30  # default limit of all records
-LONGEST_S = LEAST_EXACT / float_info.epsilon  # floats resolve the times of a run up to here
+LONGEST_S = MAX_ROUNDING_ERROR / float_info.epsilon  # floats resolve the times of a run up to here
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # estimates; the second for two rows of a quintic reference
 STEP_S = 1e-3  # default step of a method of fixed step

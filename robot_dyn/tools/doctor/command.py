@@ -112,6 +112,7 @@ def diff_robots(
     joint: list[str] | None = None,
     sign: list[str] | None = None,
     offset: list[str] | None = None,
+    same_q: bool = False,
     tolerance: float = 0.01,
     samples: int = 1000,
     options: RobotOptions = AS_STATED,
@@ -119,9 +120,9 @@ def diff_robots(
 ) -> None:
     """Compare two files of one robot: their values, in N m too.
 
-    It prints the map q_b = s q_a + o, the values that differ, and the largest differences found of N and M. The exit
-    code is 1 if these exceed the tolerance, or if a joint has no counterpart. --lock applies to each file that has the
-    joint, --xacro to xacro files.
+    It prints the map q_b = s q_a + o that the joint axes show, the values that differ, and the largest differences
+    found of N and M. The exit code is 1 if these exceed the tolerance, or if a joint has no counterpart. --lock applies
+    to each file that has the joint, --xacro to xacro files.
 
     Options:
         a (A): A name of `robot-dyn list`, or the path of a URDF, MJCF or xacro file.
@@ -129,6 +130,7 @@ def diff_robots(
         joint (A=B): Joint of A and its counterpart in B, where the names differ; may be repeated.
         sign (JOINT=S): Sign s of a joint of A, 1 or -1; may be repeated.
         offset (JOINT=VALUE): Offset o of a joint of A, in rad or m; may be repeated.
+        same_q: Compare at equal q: propose no signs and no offsets.
         tolerance: Largest accepted difference of N, in N m or N, and of M at 1 rad/s² or 1 m/s².
         samples (COUNT): Number of random states from which the search starts.
     """
@@ -150,6 +152,7 @@ def diff_robots(
         joints=arguments.pairs("--joint", joint, "A=B"),
         signs=arguments.assignments("--sign", sign or []),
         offsets=arguments.assignments("--offset", offset or []),
+        same_q=same_q,
         tolerance=tolerance,
         samples=samples,
     )

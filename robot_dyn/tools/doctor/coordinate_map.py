@@ -3,7 +3,8 @@
 From the base outwards, each body of b is laid on its counterpart in a: its joint axis on that of a, which gives the
 sign s; then turned about it until the axes of the joints that it carries coincide, which gives the offset o. An axis is
 a line, so some angles are ambiguous by π: the best of up to 64 combinations is kept, measured by the misfit of the
-axes, then of the centres of mass and of links of one name, then by the number of joints without q_b = q_a.
+axes, then of the centres of mass and of links of one name, then by the number of joints without q_b = q_a. Values that
+are given replace the proposal of their joint alone.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _BODY, _PLAIN = 0.1, 1e-3  # weights of centres of mass and links, and of joints
 class Basis(StrEnum):
     """Origin of the sign and the offset of a joint."""
 
-    AXES = "axes"
-    ASSUMED = "assumed: no joint axis beyond it depends on o"
+    AXES = "joint axes"
+    ASSUMED = "assumed: no joint axis shows o"
     GIVEN = "given"
 
 
@@ -150,18 +151,35 @@ def laid_bodies(
                 raise QueryError(f"signs[{name!r}] must be 1 or -1, got {shown(value)}")
     of_a, of_b = Lagrangian(a).linkage, Lagrangian(b).linkage
     pairs, obstacles = _pairs(of_a, of_b, names)
-    size = max((float(np.linalg.norm(body.pose.p)) for body in of_a.bodies), default=0.0) or 1.0
+    laid = _best(of_a, of_b, pairs, {})
+    if signs or offsets:  # joints without given values keep their proposals
+        maps = {
+            x.a: x if x.a not in {**signs, **offsets} else JointMap(
+                x.a, x.b, int(signs.get(x.a, x.sign)), float(offsets.get(x.a, x.offset)), Basis.GIVEN
+            )
+            for x in (body.map for body in laid)
+        }  # fmt: skip
+        laid = _best(of_a, of_b, pairs, maps)
+    obstacles += [
+        Unmapped("a", body.map.a, Obstacle.AXIS)
+        for body in laid
+        if body.turn > _LARGEST_TURN and body.map.basis is not Basis.GIVEN
+    ]
+    return laid, tuple(obstacles)
+
+
+def _best(a: Linkage, b: Linkage, pairs: Mapping[int, int], maps: Mapping[str, JointMap]) -> tuple[Laid, ...]:
+    """Return the bodies of b laid on those of a by these maps; without maps, by those of the least misfit."""
+    size = max((float(np.linalg.norm(body.pose.p)) for body in a.bodies), default=0.0) or 1.0
     beam: list[tuple[float, tuple[Laid, ...]]] = [(0.0, ())]
     for i in pairs:
         beam = [
-            (cost + _misfit(of_a, of_b, body, size), (*laid, body))
+            (cost + _misfit(a, b, body, size), (*laid, body))
             for cost, laid in beam
-            for body in _laid(of_a, of_b, pairs, i, laid, signs, offsets)
+            for body in _laid(a, b, pairs, i, laid, maps.get(a.bodies[i].joint))
         ]
         beam = sorted(beam, key=lambda entry: entry[0])[:_BEAM]
-    laid = beam[0][1]
-    obstacles += [Unmapped("a", body.map.a, Obstacle.AXIS) for body in laid if body.turn > _LARGEST_TURN]
-    return laid, tuple(obstacles)
+    return beam[0][1]
 
 
 def _pairs(a: Linkage, b: Linkage, names: Mapping[str, str]) -> tuple[dict[int, int], list[Unmapped]]:
@@ -190,17 +208,16 @@ def _pairs(a: Linkage, b: Linkage, names: Mapping[str, str]) -> tuple[dict[int, 
 
 
 def _laid(
-    a: Linkage, b: Linkage, pairs: Mapping[int, int], i: int, laid: tuple[Laid, ...],
-    signs: Mapping[str, float], offsets: Mapping[str, float],
+    a: Linkage, b: Linkage, pairs: Mapping[int, int], i: int, laid: tuple[Laid, ...], stated: JointMap | None
 ) -> Iterator[Laid]:  # fmt: skip
-    """Yield body i of b laid on that of a, for each candidate of its offset."""
+    """Yield body i of b laid on that of a by a stated map, or for each candidate of its offset."""
     body, other = a.bodies[i], b.bodies[pairs[i]]
     below = {x.i: x for x in laid}
     still = Pose(np.eye(3), np.zeros(3))
     carrier, carrier_b = (below[body.parent].a, below[body.parent].b) if body.parent in below else (still, still)
     here, there = carrier @ body.pose, carrier_b @ other.pose
     axis, other_axis = here.R @ body.axis, there.R @ other.axis
-    sign = int(signs.get(body.joint, 1 if axis @ other_axis >= 0 else -1))
+    sign = 1 if axis @ other_axis >= 0 else -1
     turn, R = _between(sign * other_axis, axis)
     gap = there.p - here.p
     gap = gap - (gap @ axis) * axis if body.revolute else np.zeros(3)
@@ -212,22 +229,24 @@ def _laid(
         feet = (_foot(axis, *line_b) - _foot(axis, *line_a) for line_a, line_b in lines if _is_crossed(axis, line_a[1]))
         slide = next(feet, 0.0) * axis
         gap, there = gap + slide, Pose(there.R, there.p - slide)
-    candidates = [*dict.fromkeys(_candidates(axis, lines, body.revolute))]
-    basis = Basis.AXES if candidates else Basis.ASSUMED
-    if not candidates and body.revolute:
-        candidates = [_snapped(_about(axis, here.R @ there.R.T)), *np.arange(-1, 3) * (pi / 2)]
-    if body.joint in offsets:
-        candidates, basis = [sign * float(offsets[body.joint])], Basis.GIVEN
-    elif body.joint in signs:
-        basis = Basis.GIVEN
-    for x in dict.fromkeys((*candidates, *(() if body.joint in offsets else (0.0,)))):
+    basis = Basis.AXES
+    if stated is not None:
+        candidates = [sign * stated.offset]
+    else:
+        candidates = [*_candidates(axis, lines, body.revolute)]
+        if not candidates:
+            basis = Basis.ASSUMED
+            candidates = [_snapped(_about(axis, here.R @ there.R.T)), *np.arange(-1, 3) * (pi / 2)] * body.revolute
+        candidates.append(0.0)
+    for x in dict.fromkeys(candidates):
         turned = rotation(axis, x) if body.revolute else np.eye(3)
         slid = np.zeros(3) if body.revolute else x * axis
         placed = Pose(turned @ there.R, here.p + turned @ (there.p - here.p) + slid)
         offset = float(sign * x) + 0.0
-        if body.revolute and offset <= -pi + 1e-9 and body.joint not in offsets:
-            offset += 2 * pi
-        yield Laid(i, pairs[i], JointMap(body.joint, other.joint, sign, offset, basis), turn, gap, here, placed)
+        offset += 2 * pi if body.revolute and offset <= -pi + 1e-9 else 0.0
+        own = stated or JointMap(body.joint, other.joint, sign, offset, basis)
+        angle = turn if own.sign == sign else pi - turn
+        yield Laid(i, pairs[i], own, angle, gap, here, placed)
 
 
 def _candidates(axis: np.ndarray, lines: list, revolute: bool) -> Iterator[float]:

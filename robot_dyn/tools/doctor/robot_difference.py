@@ -23,9 +23,9 @@ from robot_dyn.foundations import (
     instance,
     integer,
     number,
-    number_or_dash,
     reported,
     shown,
+    truth,
 )
 from robot_dyn.queries import of_joint, unit
 from robot_dyn.tools.doctor.coordinate_map import Basis, JointMap, Laid, Obstacle, Unmapped, laid_bodies, matched_names
@@ -33,6 +33,8 @@ from robot_dyn.tools.doctor.largest_difference import LargestDifference, MappedP
 
 _DIFFERENT = 1e-5  # of the size of a value: rounded angles such as 1.5708 cause smaller differences
 _LISTED = 4  # bodies, and joints without counterpart, that are printed
+_MEANING = {"N": "N (torques at rest)", "M": "M (mass matrix)"}
+_BOTH = " and ".join(_MEANING.values())
 _REMEDIES = {
     Obstacle.MISSING: "name the counterpart (joints=, --joint A=B), or lock it (with_(lock=…), --lock NAME=0)",
     Obstacle.TYPE: "correct the type in one file, or name another counterpart with joints=",
@@ -97,7 +99,10 @@ class RobotDifference(Answer):
     @property
     def worst(self) -> LargestDifference | None:
         """The largest difference found of N; None without a map of all joints."""
-        rows = [row for row in self.largest if row.quantity == "N"]
+        return self._worst("N")
+
+    def _worst(self, quantity: str) -> LargestDifference | None:
+        rows = (row for row in self.largest if row.quantity == quantity)
         return max(rows, key=lambda row: abs(row.difference), default=None)
 
     @property
@@ -107,14 +112,17 @@ class RobotDifference(Answer):
         if self.unmapped:
             groups = dict.fromkeys((x.file, x.obstacle) for x in self.unmapped)
             return f"no torques of {a} and {b} are compared: {'; '.join(self._unmapped(*group) for group in groups)}"
-        row, moved = self.worst, ", ".join(x.a for x in self.joints if (x.sign, x.offset) != (1, 0.0))
-        mapped = f"; this holds with another sign or zero of {moved}, not at equal q" * bool(moved)
-        if row is None or row.difference == 0:
-            return f"{a} and {b} need the same torques at rest: no difference of N found{mapped}"
-        return (
-            f"{a} and {b} {'agree' if self.agrees else 'differ'}: the largest difference found of N, the torques at"
-            f" rest, is {abs(row.difference):.3g} {row.unit} at {row.joint}{_of_effort(row)}{mapped}"
-        )
+        found = [
+            f"{abs(row.difference):.3g} {row.unit} at {row.joint}{_of_effort(row)}, in {_MEANING[row.quantity]}"
+            for row in (self.worst, self._worst("M"))
+            if row is not None and row.difference
+        ]
+        what = f"largest differences found {'; '.join(found)}" if found else f"no difference found in {_BOTH}"
+        if not found and self.differences:
+            what += f", but these values differ: {', '.join(dict.fromkeys(x.quantity for x in self.differences))}"
+        moved = ", ".join(x.a for x in self.joints if (x.sign, x.offset) != (1, 0.0))
+        converted = f"; q is converted at {moved}: another sign or zero position" * bool(moved)
+        return f"{a} and {b} {'agree' if self.agrees else 'differ'}: {what}{converted}"
 
     def blocks(self) -> Iterator[Block]:
         a, b = self.names
@@ -128,9 +136,12 @@ class RobotDifference(Answer):
             yield f"the order of q differs: {', '.join(self.order[0])} in {a}; {', '.join(self.order[1])} in {b}"
         yield ""
         if self.differences:
-            yield "values that differ, in the coordinates and joint frames of " + f"{a}:"
+            yield (
+                f"values that differ, converted to the coordinates and joint frames of {a}; masses, centres and moments"
+                " are those of the link that the joint moves, with all links fixed to it:"
+            )
             rows = tuple(
-                (x.joint or "(robot)", x.quantity + f" [{x.unit}]" * bool(x.unit), _numbers(x.a), _numbers(x.b))
+                (x.joint or "(robot)", x.quantity + f" [{x.unit}]" * bool(x.unit), *_numbers(x.a, x.b))
                 for x in self.differences
             )
             yield Table(("joint", "value", a, b), rows, right=(a, b))
@@ -150,19 +161,23 @@ class RobotDifference(Answer):
 
     def _map(self) -> Iterator[Block]:
         a, b = self.names
-        changed = [x for x in self.joints if (x.a, x.sign, x.offset) != (x.b, 1, 0.0) or x.basis is Basis.GIVEN]
-        if not changed:
-            yield "map of coordinates: q_b = q_a at all joints, from names and axes"
+        if all((x.a, x.sign, x.offset) == (x.b, 1, 0.0) for x in self.joints):
+            given = all(x.basis is Basis.GIVEN for x in self.joints)
+            yield f"equal coordinates: q of {b} = q of {a}, {'as given' if given else 'as names and joint axes show'}"
             return
-        yield "map of coordinates q_b = s q_a + o, with b: " + f"{b}; override it with signs= and offsets=:"
+        yield f"map of coordinates: q of {b} = s · q of {a} + o"
+        yield "correct a row by signs= or offsets= (--sign, --offset); compare at equal q by same_q=True (--same-q)"
         rows = tuple((x.a, x.b, f"{x.sign:+d}", _offset(x.offset), x.basis.value) for x in self.joints)
         yield Table(
-            (f"joint of {a}", f"joint of {b}", "s", "o [rad] or [m]", "from"), rows, right=("s", "o [rad] or [m]")
+            (f"joint of {a}", f"joint of {b}", "s", "o [rad] or [m]", "known from"), rows, right=("s", "o [rad] or [m]")
         )
 
     def _cost(self) -> Iterator[Block]:
         a, b = self.names
-        yield f"largest differences found, |{b} − {a}|, from {self.samples} random states and local ascent:"
+        yield (
+            f"largest differences found, |{b} − {a}|, in {_BOTH}, from {self.samples} random postures within the joint"
+            " limits of both; larger ones may exist:"
+        )
         M = {row.joint: row for row in self.largest if row.quantity == "M"}
         rows = tuple(
             (row.joint, f"{abs(row.difference):.3g} {row.unit}", _percent(row.effort_fraction),
@@ -172,18 +187,19 @@ class RobotDifference(Answer):
         yield Table(
             ("joint", "N", "of its effort limit", "M", "column of M"), rows, right=("N", "of its effort limit", "M")
         )
-        for row in (self.worst, max(M.values(), key=lambda row: abs(row.difference), default=None)):
+        yield f"tolerance: {self.tolerance:g} N m or N; M counts at 1 rad/s² or 1 m/s²"
+        for row in (self.worst, self._worst("M")):
             if row is not None and row.difference:
                 entry = row.joint if row.quantity == "N" else f"{row.joint}, {row.column}"
                 yield ""
                 yield (
-                    f"{row.quantity} at {entry}: {row.a:.4g} {row.unit} in {a}, {row.b:.4g} {row.unit} in {b}, at q ="
-                    f" {', '.join(f'{round(x, 3) + 0.0:g}' for x in row.q)}"
+                    f"{row.quantity} at {entry}: {row.a:.4g} {row.unit} in {a}, {row.b:.4g} {row.unit} in {b}, where q"
+                    f" of {a} = {', '.join(f'{round(x, 3) + 0.0:g}' for x in row.q)}"
                 )
                 listed = ", ".join(f"{share.link} {share.value:+.3g}" for share in row.shares[:_LISTED])
                 rest = sum(share.value for share in row.shares[_LISTED:])
                 others = f", others {rest:+.3g}" if len(row.shares) > _LISTED else ""
-                yield f"  share of each link, with the links fixed to it [{row.unit}]: {listed}{others}"
+                yield f"  by link, with the links fixed to it, this difference is [{row.unit}]: {listed}{others}"
 
 
 def diff_robots(
@@ -193,6 +209,7 @@ def diff_robots(
     joints: Mapping[str, str] | None = None,
     signs: Mapping[str, float] | None = None,
     offsets: Mapping[str, float] | None = None,
+    same_q: bool = False,
     tolerance: float = 0.01,
     samples: int = 1000,
     seed: int = 0,
@@ -208,8 +225,9 @@ def diff_robots(
         a: A robot.
         b: The robot of another file.
         joints: Joint of b by joint of a, where the names differ.
-        signs: s by joint of a, 1 or −1, where the proposal is wrong.
+        signs: s by joint of a, 1 or −1, where the proposal is wrong; the other joints keep their proposals.
         offsets: o by joint of a, in [rad] or [m], where the proposal is wrong.
+        same_q: Compare at equal q, without proposals: s = 1 and o = 0, except where given.
         tolerance: Largest accepted difference of N, in [N m] or [N], and of M at 1 rad/s² or 1 m/s².
         samples: Number of random states.
         seed: Seed of the random generator.
@@ -227,13 +245,14 @@ def diff_robots(
         instance(label, robot, Robot, "give a robot, for example rd.load('ur5')")
     tolerance, samples = number("tolerance", tolerance, least=0), integer("samples", samples, least=1, most=10**6)
     seed = integer("seed", seed, most=2**128 - 1)
-    given = []
     for label, values in (("joints", joints), ("signs", signs), ("offsets", offsets)):
         if not isinstance(values, Mapping | None):
             raise QueryError(f"{label} must be values by joint of a, such as {{'joint_1': …}}, got {shown(values)}")
-        given.append({} if values is None else values)
-    names = matched_names(a, b, given[0])
-    laid, unmapped = laid_bodies(a, b, names, *given[1:])
+    names = matched_names(a, b, joints or {})
+    signs, offsets = dict(signs or {}), dict(offsets or {})
+    if truth("same_q", same_q):
+        signs, offsets = dict.fromkeys(names, 1.0) | signs, dict.fromkeys(names, 0.0) | offsets
+    laid, unmapped = laid_bodies(a, b, names, signs, offsets)
     maps = tuple(body.map for body in laid)
     largest, order, differences = (), (), [*_of_robot(a, b), *_of_bodies(a, b, laid), *_of_followers(a, b, laid)]
     if not unmapped:
@@ -278,9 +297,9 @@ def _of_bodies(a: Robot, b: Robot, laid: tuple[Laid, ...]) -> Iterator[Differenc
     for x in laid:
         name, frame = x.map.a, x.a
         if x.turn > _DIFFERENT:
-            yield Difference(name, "direction of the axis, turned by", "deg", (0.0,), (degrees(x.turn),))
+            yield Difference(name, "axis turned by", "deg", (0.0,), (degrees(x.turn),))
         if (shift := float(np.linalg.norm(x.shift))) > _DIFFERENT * length:
-            yield Difference(name, "place of the axis, moved by", "m", (0.0,), (shift,))
+            yield Difference(name, "axis moved by", "m", (0.0,), (shift,))
         (m, c, moments), (m_b, c_b, moments_b) = _body(linkage.inertias[x.i]), _body(other.inertias[x.k])
         R = frame.R.T @ x.b.R
         c_b = R @ c_b + frame.R.T @ (x.b.p - frame.p)
@@ -356,7 +375,7 @@ def _differing(
 
 
 def _of_effort(row: LargestDifference) -> str:
-    return f" ({_percent(row.effort_fraction)} of its effort limit)" if np.isfinite(row.effort_fraction) else ""
+    return f", {_percent(row.effort_fraction)} of its effort limit" if np.isfinite(row.effort_fraction) else ""
 
 
 def _percent(fraction: float) -> str:
@@ -369,5 +388,10 @@ def _offset(offset: float) -> str:
     return exact[round(turns)] if round(turns) in exact and abs(turns - round(turns)) < 1e-9 else f"{offset:.6g}"
 
 
-def _numbers(values: tuple[float, ...]) -> str:
-    return ", ".join(number_or_dash(x + 0.0, 4) for x in values) or "absent"
+def _numbers(*values: tuple[float, ...]) -> list[str]:
+    """Return values as texts of 4 digits, of more if they would read alike."""
+    for digits in (4, 7, 17):
+        texts = [", ".join(f"{x + 0.0:.{digits}g}" if np.isfinite(x) else "none" for x in row) for row in values]
+        if len({*texts}) > 1:
+            break
+    return [text or "absent" for text in texts]

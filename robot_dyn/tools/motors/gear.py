@@ -12,7 +12,7 @@ the gear may help or hinder, and the motor is taken to hold the whole torque.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -36,10 +36,23 @@ class Gear:
     efficiency: np.ndarray
     rotor: np.ndarray
 
+    def of(self, joints: Any) -> Gear:
+        """Return the gears of joints, by index."""
+        return Gear(self.efficiency[joints], self.rotor[joints])
+
+    def factor(self, tau: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return η^−s, (..., n), for torques of joints or of motors: τ − J a has the same sign on both sides."""
+        direction = np.where(np.abs(v) < _REST, 0.0, np.sign(v))
+        return self.efficiency ** -(np.sign(tau - self.rotor * a) * direction)
+
     def loss(self, tau: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return τ_motor − τ at velocities v and accelerations a, (..., n)."""
-        through, direction = tau - self.rotor * a, np.where(np.abs(v) < _REST, 0.0, np.sign(v))
-        return through * (self.efficiency ** -(np.sign(through) * direction) - 1)
+        return (tau - self.rotor * a) * (self.factor(tau, v, a) - 1)
+
+    def at_joint(self, tau_motor: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return τ for torques of motors, (..., n), which it increases with; infinite for infinite ones."""
+        through = tau_motor - self.rotor * a
+        return self.rotor * a + through / self.factor(tau_motor, v, a)
 
 
 def with_loss(split: Causes, gear: Gear | None, v: np.ndarray, a: np.ndarray) -> Causes:

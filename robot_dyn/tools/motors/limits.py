@@ -11,14 +11,23 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, extreme_values
-from robot_dyn.effects import EffortLimit, RigidStops
-from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
+from robot_dyn.effects import EffortLimit, RigidStops, TorqueSpeed
+from robot_dyn.foundations import (
+    EffectError,
+    PlanError,
+    check_coefficients,
+    coefficient,
+    declared,
+    instance,
+    nearest,
+    shown,
+)
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.motors_file import Motors
-from robot_dyn.tools.motors.torque_speed import TorqueSpeed
 
 _SAME_ROTOR = 0.01  # largest relative difference of inertias
+_UNLIKE = 20.0  # factor between the limits of a motor and of the robot's file that suggests the wrong side of a gear
 _BEYOND = 1e-9  # [rad] or [m]: rounding by which a position may exceed its limit
 
 
@@ -40,7 +49,9 @@ class Limits:
         line: Peak torque of driving motors by speed; None for none.
         continuous_line: Continuous torque by the mean speed of a motion; None for none.
         brake: Holding torque of brakes by joint, in [N m] or [N].
+        bearing: Largest loads on bearings by joint and load.
         gear: Gears with losses, so that torque limits are those of motors; None for none.
+        findings: Doubtful limits, with remedies.
     """
 
     effort: Any = field(default=inf, metadata=coefficient("N m", minimum=0, infinite=True, fill_value=inf))
@@ -50,7 +61,9 @@ class Limits:
     line: TorqueSpeed | None = None
     continuous_line: TorqueSpeed | None = None
     brake: Mapping[str, float] = field(default_factory=dict)
+    bearing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gear: Gear | None = None
+    findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_coefficients(self, PlanError, allow_unresolved=True)
@@ -110,7 +123,7 @@ def limits_of(
     """
     robot: Any = plant.dynamics
     if motors is not None:
-        _check_rotors(motors, robot)
+        _check_joints(motors, robot)
         effort = motors.peak if effort is None else effort
         velocity = (motors.speed or None) if velocity is None else velocity
         continuous = (motors.continuous or None) if continuous is None else continuous
@@ -121,13 +134,28 @@ def limits_of(
     if motors is not None:
         limits = replace(
             limits,
-            brake={name: x for name, x in motors.brake.items() if name in robot.joint_names},
+            brake=motors.brake,
+            bearing=motors.bearing,
             gear=_gear(motors, robot),
             line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
             continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),
+            findings=tuple(_unlike(motors, robot)),
         )
     saturates = [np.broadcast_to(effect.limit, robot.n) for effect in plant.effects if isinstance(effect, EffortLimit)]
     return replace(limits, effort=np.minimum.reduce([limits.effort, *saturates]))
+
+
+def _unlike(motors: Motors, robot: Any) -> Iterator[str]:
+    """Yield a finding for each motor whose peak torque or speed is far from the limit in the robot's file."""
+    for kind, of_motors, limit in (("peak", motors.peak, "effort_limit"), ("speed", motors.speed, "velocity_limit")):
+        stated = np.broadcast_to(getattr(robot, limit, inf), robot.n).tolist()
+        for name, of_file in zip(robot.joint_names, stated, strict=True):
+            value = of_motors.get(name, of_file)
+            if 0 < of_file < inf and not 1 / _UNLIKE <= value / of_file <= _UNLIKE:
+                yield (
+                    f"{motors.source}: the {kind} of {name!r} is {value:.4g} at the joint, but {of_file:.4g} in the"
+                    " robot's file; check the columns at and gear_ratio, and the units"
+                )
 
 
 def _gear(motors: Motors, robot: Any) -> Gear | None:
@@ -195,8 +223,11 @@ def same_rotor(one: float, other: float) -> bool:
     return abs(one - other) <= _SAME_ROTOR * max(one, other)
 
 
-def _check_rotors(motors: Motors, robot: Any) -> None:
-    """Raise a PlanError if a rotor is not part of the arm: its torque would be missing."""
+def _check_joints(motors: Motors, robot: Any) -> None:
+    """Raise a PlanError if a joint is unknown, or a rotor is not part of the arm: its torque would be missing."""
+    for joint in (*motors.peak, *motors.continuous, *motors.speed, *motors.brake, *motors.bearing):
+        if joint not in robot.joint_names:
+            raise PlanError(f"{motors.source}: no joint {shown(joint)}; {nearest(joint, robot.joint_names)}")
     armatures = dict(zip(robot.joint_names, getattr(robot, "armature", np.zeros(robot.n)), strict=True))
     for joint, inertia in motors.armature.items():
         armature = float(armatures.get(joint, inertia))

@@ -32,7 +32,7 @@ from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending, RemarkKind, Stability, StateEquation, jacobian, linearised, step_map
 from robot_dyn.tools.stress.result import Limit, WorstCase
 from robot_dyn.tools.stress.work import Work
-from robot_dyn.tools.stress.worst import NOTHING, Gains, worst
+from robot_dyn.tools.stress.worst import NEGLIGIBLE, Gains, worst
 
 _WITHIN, _BEYOND = 0.98, 1.02  # fractions of a limit
 LEAST = 0.3  # fraction of the true error below which an estimate misleads
@@ -72,7 +72,7 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, budget: B
         "speed", "Coriolis torque exceeds an effort limit, at a multiple of the velocity limits", "", inf, "times"
     )
     case = worst(WorstCase("speed"), states, rng, ("q", "v"), measure, budget)
-    if not case.minimal > NOTHING:
+    if not case.minimal > NEGLIGIBLE:
         return replace(limit, within=_NO_TORQUE)
     q, v = np.array(case.state["q"]), direction(np.array(case.state["v"]))
     joint = robot.joint_names[int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))]
@@ -118,7 +118,7 @@ def payload_limit(robot: Robot, states: Batch, rng: np.random.Generator, gains: 
 
     limit = Limit("payload", f"gravity torque of a payload at {frame}", "", inf, "kg")
     case = worst(WorstCase("payload"), states, rng, ("q",), lambda x: inverse_masses(x).max(axis=1), budget)
-    if not case.minimal > NOTHING:
+    if not case.minimal > NEGLIGIBLE:
         return replace(limit, within=_NO_TORQUE)
     q = np.array(case.state["q"])
     joint = robot.joint_names[int(np.argmax(inverse_masses({"q": q[None]})[0]))]

@@ -36,7 +36,7 @@ from robot_dyn.tools.stress.work import FAILURES, Work
 FASTEST = "fastest motion"
 HELD = ("steps", "gain")  # limits at the state where the motion is fastest under a PD
 KEPT = 0.9  # fraction of the largest value that a simplified state keeps
-NOTHING = 1e-12  # relative to an effort limit: smaller torques are rounding of zero
+NEGLIGIBLE = 1e-12  # relative to an effort limit: smaller torques are rounding of zero
 _ROUNDS = 3  # attempts of a search that finds nothing worse
 _FREQUENCY = 20.0  # [rad/s], for the gains of a PD
 _MOST_DIGITS = 17
@@ -165,7 +165,7 @@ def worst_configurations(
         detail = case.note if case.quantity == FASTEST else case.joint
         name, needed_for = f"worst {case.quantity}{f', {detail}' if detail else ''}", HELD if case.note == BY_PD else ()
         result = work.do(name, partial(worst, case, states, rng, ("q",), measure), needed_for)
-        if result is not None and result.searched > NOTHING:  # otherwise gravity has no torque on the joint
+        if result is not None and result.searched > NEGLIGIBLE:  # otherwise gravity has no torque on the joint
             yield result
 
 

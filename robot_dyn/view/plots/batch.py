@@ -24,7 +24,7 @@ from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
-_MOST_LINES = 100  # drawn runs that diverged
+_MAX_LINES = 100  # drawn runs that diverged
 _CELL_MM = 42.0  # the least width of a cell
 
 
@@ -169,14 +169,14 @@ def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.n
         low, quarter, median, three_quarters, high = bands = np.full((len(LEVELS), len(t)), np.nan)
         if known.any():
             bands[:, known] = np.nanquantile(held[:, known], LEVELS, axis=0)
-        lines = tuple(Curve("_diverged", t, line, (LOST, LOST), is_scaled=False) for line in lost[:_MOST_LINES])
+        lines = tuple(Curve("_diverged", t, line, (LOST, LOST), is_scaled=False) for line in lost[:_MAX_LINES])
         shades = (("25 to 75 %", quarter, three_quarters, 0.4), ("5 to 95 %", low, high, 0.18))
         ends = np.array([t[np.isfinite(line)][-1] for line in lost if np.isfinite(line).any()])
         cells.append(Cell(name, TIME, y, (Curve("median", t, median), *lines), bands=shades, lost=ends))
     rows = in_rows(cells, int(view.width / _CELL_MM))
     early = int(((view.runs.ended_s < t[-1]) & ~gone).sum())
     counted = f"; {early} ended early, bands are of those still running" if early else ""
-    many = f", {_MOST_LINES} of them drawn" if gone.sum() > _MOST_LINES else ""
+    many = f", {_MAX_LINES} of them drawn" if gone.sum() > _MAX_LINES else ""
     return Panel(f"{what} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows)
 
 

@@ -17,7 +17,7 @@ from robot_dyn.view.series import thinned
 
 _WILD = 1e3  # times its usual size: what grew beyond it while a run diverged needs a logarithm
 NEAR = 0.2  # fraction of its effort limit: a torque that stays below is drawn without it
-_MOST_MARKS = 200  # in a cell
+_MAX_MARKS = 200  # in a cell
 _LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
 _PIXELS = 1000  # across a cell
 THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, distinguishable for the colour-blind, by contrast
@@ -144,7 +144,7 @@ class Cell(Axes):
             axes.axhline(level, label="_limit", color=theme["ink"], alpha=0.7, linestyle=_DASHES[3], linewidth=0.6)
         upright = {"transform": axes.get_xaxis_transform()}
         dotted = {"color": theme["ink"], "linewidth": 0.6, "linestyle": ":"}
-        axes.vlines(self.marks[:_MOST_MARKS], 0, 1, label="_events", **dotted, **upright)
+        axes.vlines(self.marks[:_MAX_MARKS], 0, 1, label="_events", **dotted, **upright)
         for rest in self.rests:
             shade = {"color": colours[LOST], "alpha": 0.25} if rest.at_stop else {"color": theme["grid"]}
             axes.axvspan(rest.start, rest.end, linewidth=0, zorder=0.5, label="_rest", **shade)

@@ -28,7 +28,7 @@ from robot_dyn.view.series import effort_limits
 if TYPE_CHECKING:
     from robot_dyn.view.plots.shown import Figure
 
-MOST_JOINTS = 64  # largest number of joints in one figure
+MAX_JOINTS = 64  # largest number of joints in one figure
 STYLES = ("screen", "paper")
 
 
@@ -143,8 +143,8 @@ def _width(width_mm: float) -> float:
 def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tuple[int, ...]:
     """Return the columns of the shown joints."""
     columns = tuple(i for i, name in enumerate(run.joint_names) if name in shown)
-    if not 0 < len(columns) <= MOST_JOINTS:
-        count = f"{len(columns)} joints, and one figure shows 1 to {MOST_JOINTS}"
+    if not 0 < len(columns) <= MAX_JOINTS:
+        count = f"{len(columns)} joints, and one figure shows 1 to {MAX_JOINTS}"
         raise PlotError(f"{count}; select some, for example joints={list(run.joint_names[:2])}")
     return columns
 

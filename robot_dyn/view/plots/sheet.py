@@ -23,8 +23,8 @@ A4_MM, MM = 297.0, 1 / 25.4
 _HEADING, _BESIDE = 10.0, 14.0  # [mm]: about what a heading and a legend take, and what the y axis of a cell takes
 _LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, next to the text of a legend
 _RIGHT = 1.5  # [mm], free at the right for half of the last number of an x axis
-_LEAST_ROW = 20.0  # [mm], with its title and its numbers
-_MOST_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary
+_MIN_ROW = 20.0  # [mm], with its title and its numbers
+_MAX_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary
 
 
 @final
@@ -62,12 +62,12 @@ def draw(
     from robot_dyn.view.plots.shown import Figure
 
     told = "\n".join(remarks)
-    if len(told) > _MOST_REMARKS * width:
-        told = f"{told[: int(_MOST_REMARKS * width)].rpartition(' ')[0]} … the summary has all remarks"
+    if len(told) > _MAX_REMARKS * width:
+        told = f"{told[: int(_MAX_REMARKS * width)].rpartition(' ')[0]} … the summary has all remarks"
     lines = sum(1 + _LETTER * style.text * len(line) // width for line in f"{opening}\n{told}".split("\n"))
     above = lines * _LINE * style.text if style.titled else 0.0
     heights = [panel.tall(panel.height) for panel in panels]
-    tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
+    tall = max(above + sum(panel.tall(_MIN_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
     figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"])
     figure.set_layout_engine("constrained", rect=(0, 0, 1 - _RIGHT / width, 1))
     body = figure.add_subfigure(figure.add_gridspec()[0])

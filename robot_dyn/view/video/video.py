@@ -20,11 +20,11 @@ from robot_dyn.view.video import encoders
 from robot_dyn.view.video.browser import frames, installed, playwright
 
 KINDS = FileKind("an MP4 video", ".mp4", b"\0\0\0"), FileKind("a GIF", ".gif", b"GIF8")
-_FPS, _MOST_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
-_MOST_FRAMES = 20_000
+_FPS, _MAX_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
+_MAX_FRAMES = 20_000
 _ROUNDING = 1e-9  # fraction of a frame: T fps is a whole number up to this
-_MOST_PIXELS = 5 * 10**8  # pixels of a GIF; its frames take 4.5 bytes a pixel in memory
-_LEAST_SIZE, _MOST_SIZE = 160, 3840
+_MAX_PIXELS = 5 * 10**8  # pixels of a GIF; its frames take 4.5 bytes a pixel in memory
+_MIN_SIZE, _MAX_SIZE = 160, 3840
 
 
 def save_video(
@@ -40,7 +40,7 @@ def save_video(
     """Write the video of a page, given as its text; for arguments and errors, see `Page.save_video`."""
     file = target(path, KINDS, VideoError)
     kind = file.suffix.lower()
-    rate = integer("fps", _FPS[kind] if fps is None else fps, least=1, most=_MOST_FPS[kind], error=VideoError)
+    rate = integer("fps", _FPS[kind] if fps is None else fps, least=1, most=_MAX_FPS[kind], error=VideoError)
     size, dark = _checked_size(size), truth("dark", dark, error=VideoError)
     function("on_progress", on_progress, "a part and a text", error=VideoError)
     times = _checked_times(duration_s, rate, kind, size)
@@ -73,7 +73,7 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
     if not isinstance(size, tuple | list) or len(size) != 2:
         raise VideoError(f"size must be a width and a height in pixels, got {size!r}")
     width, height = (
-        integer(f"size[{k}]", pixels, least=_LEAST_SIZE, most=_MOST_SIZE, error=VideoError)
+        integer(f"size[{k}]", pixels, least=_MIN_SIZE, most=_MAX_SIZE, error=VideoError)
         for k, pixels in enumerate(size)
     )
     if width % 2 or height % 2:
@@ -88,12 +88,12 @@ def _checked_times(duration_s: float, fps: int, kind: str, size: tuple[int, int]
     if not duration_s > 0:
         raise VideoError("no run on the page has a duration, so nothing moves; save the page with .save(path)")
     count = duration_s * fps
-    if count > _MOST_FRAMES:
+    if count > _MAX_FRAMES:
         raise VideoError(
-            f"{duration_s:g} s at {fps} frames a second are {count:.0f} frames, more than {_MOST_FRAMES}; use a lower"
+            f"{duration_s:g} s at {fps} frames a second are {count:.0f} frames, more than {_MAX_FRAMES}; use a lower"
             " frame rate"
         )
-    if kind == ".gif" and count * size[0] * size[1] > _MOST_PIXELS:
+    if kind == ".gif" and count * size[0] * size[1] > _MAX_PIXELS:
         raise VideoError(
             f"{count:.0f} frames of {size[0]} × {size[1]} pixels are too many for a .gif; use a lower frame rate, a"
             " smaller size, or an .mp4"

@@ -44,7 +44,7 @@ async function main() {
   element("count").textContent = `drawn otherwise than its files describe, in ${data.problems.length} place${data.problems.length > 1 ? "s" : ""}`;
   await loadViewer(element("meshcat").textContent);
   const viewer = window.viewer = makeViewer(data.scene);
-  if (data.live) viewer.connect(); else data.commands.forEach((command) => viewer.handle_command(command));
+  data.commands.forEach((command) => viewer.handle_command(command));
   const camera = makeCamera(viewer, data.scene), dress = makeLayers(viewer, data);
   const marks = [];
   let loaded = null;

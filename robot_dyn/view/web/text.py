@@ -20,9 +20,8 @@ from typing import Any
 
 from robot_dyn.view.commands import as_text, packed
 
-# Nothing is loaded, and only the scripts in the page run; pictures are data; only the live page has a socket.
+# Nothing is loaded, and only the scripts in the page run; pictures are data.
 _POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; script-src {}; style-src {}; img-src data: blob:"
-_LIVE = "; connect-src 'self' ws://127.0.0.1:* ws://localhost:*"
 # One concept a file; they share their names.
 _SCRIPTS = (
     "keys.js", "clock.js", "sliders.js", "camera.js", "layers.js", "plots.js", "panels.js", "why.js", "film.js",
@@ -32,7 +31,7 @@ _PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that mes
 
 
 def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
-    """Return the HTML text of a document: title, outcome, notes, duration, scene, plots; commands unless it is `live`.
+    """Return the HTML text of a document: title, outcome, notes, duration, scene, plots, commands.
 
     Args:
         document: Result of `document` or `still`.
@@ -48,9 +47,9 @@ def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
     allowed = ("'self' " if viewer else "") + _hashes([meshcat, *scripts.values()])
     policy = _POLICY.format(allowed, _hashes([*styles.values(), *_own_styles(meshcat)]))
     return Template(_read(web / "replay.html")).substitute(
-        policy=policy + (_LIVE if document["live"] else ""),
+        policy=policy,
         title=html.escape(document["title"]),
-        data=json.dumps(as_text(document)),
+        data=json.dumps(as_text(dict(document))),
         meshcat="" if viewer else packed(meshcat.encode()),
         shared=f'<script src="{html.escape(viewer)}"></script>' if viewer else "",
         **scripts,

@@ -79,16 +79,16 @@ def errors(
     own, truth = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.accuracy.Ball(BITS))
     for state in at:
         size, absolute = magnitudes(own.linkage, state["q"]), {key: np.abs(x) for key, x in state.items()}
-        exact = {each.name: each.ask(truth, state) for each in QUERIES}
+        exact = {each.name: each.evaluate(truth, state) for each in QUERIES}
         for quantity in queries:
             x = midpoint(exact[quantity.name])
             assert np.max(radius(exact[quantity.name])) <= 1e-30 * max(1.0, np.max(np.abs(x)))
             scale = diagonal_scale(x) if quantity.definite else quantity.terms(size, absolute)
             for implementation, engine in engines.items():
-                error = scaled(quantity.ask(engine, state) - x, floored(np.asarray(scale))).max()
+                error = scaled(quantity.evaluate(engine, state) - x, floored(np.asarray(scale))).max()
                 yield Error(implementation, quantity.name, float(error) / (robot.n * U), float(error))
         inertia = midpoint(exact["M"])
-        a = midpoint(FORWARD_DYNAMICS.ask(truth, state))
+        a = midpoint(FORWARD_DYNAMICS.evaluate(truth, state))
         torques = state["tau"], midpoint(exact["coriolis_torque"]), midpoint(exact["N"])
         loss = robot.n * U * unit_diagonal_condition(inertia)
         whole = acceleration_norm(inertia, torques, FORWARD_DYNAMICS.terms(size, absolute))
@@ -99,7 +99,7 @@ def errors(
             with warnings.catch_warnings(record=True) as said:
                 warnings.simplefilter("always", PrecisionWarning)
                 try:
-                    error = float(mass_norm(inertia, FORWARD_DYNAMICS.ask(engine, state) - a) / whole)
+                    error = float(mass_norm(inertia, FORWARD_DYNAMICS.evaluate(engine, state) - a) / whole)
                 except SingularError as refusal:
                     error, near = float("nan"), str(refusal) if SOLVED * loss > FEW else ""  # else it has no right to
             words = str(said[0].message) if said else near

@@ -18,7 +18,7 @@ import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import NotFiniteError, midpoint
 from robot_dyn.lagrange import diagonal_scale, floored, magnitudes, scaled
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.queries import INVERSE_DYNAMICS, M, N, Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import SUMS, U
@@ -38,7 +38,7 @@ class Implementations(NamedTuple):
 
 def loaded(name: str) -> rd.Robot:
     """A robot of the catalog, its right angles written out in full."""
-    return completed(rd.load(name))[0]
+    return with_exact_right_angles(rd.load(name))[0]
 
 
 def implementations(robot: rd.Robot) -> Implementations:
@@ -50,11 +50,11 @@ def implementations(robot: rd.Robot) -> Implementations:
 def error(of: Implementations, implementation: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
     """In units of n u of the terms added."""
     size = magnitudes(rd.Lagrangian(of.robot).linkage, state["q"])
-    x = midpoint(quantity.ask(of.truth, state))
+    x = midpoint(quantity.evaluate(of.truth, state))
     absolute = {key: np.abs(value) for key, value in state.items()}
     with np.errstate(over="ignore"):  # of the terms where v² overflows, and every implementation refuses
         scale = diagonal_scale(x) if quantity.definite else quantity.terms(size, absolute)
-    difference = quantity.ask(of.engines[implementation], state) - x
+    difference = quantity.evaluate(of.engines[implementation], state) - x
     return float(scaled(difference, floored(np.asarray(scale))).max() / (of.robot.n * U))
 
 

@@ -30,7 +30,7 @@ from robot_dyn.lagrange import (
     scaled,
     unit_diagonal_condition,
 )
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.queries import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import U
@@ -78,13 +78,15 @@ def batches(robot: rd.Robot, seed: int) -> Iterator[Row]:
     for implementation, engine in engines.items():
         worst = 0.0
         for quantity in queries(robot):
-            whole = quantity.ask(engine, given)
+            whole = quantity.evaluate(engine, given)
             for k in (0, BATCH // 2, BATCH - 1):
                 state = {key: x[k] for key, x in given.items()}
-                apart = part(robot, quantity, state, whole[k], quantity.ask(engine, state))
+                apart = part(robot, quantity, state, whole[k], quantity.evaluate(engine, state))
                 worst = max(worst, apart / (condition(robot, state["q"]) * U))
         yield Row(f"{name}: batch and single", f"{implementation}: difference in κ u", worst, 4)
-    other = sum(int(np.sum(quantity.ask(one, given) != quantity.ask(two, given))) for quantity in queries(robot))
+    other = sum(
+        int(np.sum(quantity.evaluate(one, given) != quantity.evaluate(two, given))) for quantity in queries(robot)
+    )
     yield Row(f"{name}: one thread and two", "machine code: entries with other bits", other, 0)
 
 
@@ -93,7 +95,7 @@ def digest(name: str, seed: str, kept: str = "") -> str:
     robot = rd.load(name)
     made, hashed = rd.compiled(robot, cache=bool(kept)), hashlib.sha256()
     for quantity in queries(robot):
-        hashed.update(quantity.ask(made, states(robot.n, int(seed))).tobytes())
+        hashed.update(quantity.evaluate(made, states(robot.n, int(seed))).tobytes())
     return hashed.hexdigest()
 
 
@@ -110,7 +112,7 @@ def caches(name: str, seed: int) -> Iterator[Row]:
 def right_angles(name: str, seed: int) -> Iterator[Row]:
     """The file as it stands against its right angles written out in full."""
     robot = rd.load(name)
-    exact, changes = completed(robot)
+    exact, changes = with_exact_right_angles(robot)
     if not changes:
         yield Row(f"{name}: right angles", "none is written short: difference", 0.0, 0.0)
         return
@@ -118,7 +120,7 @@ def right_angles(name: str, seed: int) -> Iterator[Row]:
     for quantity in queries(robot):
         for k in range(3):
             state = {key: x[k] for key, x in given.items()}
-            apart = part(robot, quantity, state, quantity.ask(robot, state), quantity.ask(exact, state))
+            apart = part(robot, quantity, state, quantity.evaluate(robot, state), quantity.evaluate(exact, state))
             factor = condition(robot, state["q"]) if quantity.solves else 1.0
             worst = max(worst, (apart - 4 * factor * U) / (factor * robot.n * change))
     yield Row(f"{name}: right angles, δ = {change:.0e}", "difference in κ n δ", max(worst, 0.0), 2)
@@ -126,7 +128,7 @@ def right_angles(name: str, seed: int) -> Iterator[Row]:
 
 def engines(name: str, seed: int) -> Iterator[Row]:
     """A run by the interpreted engine, by machine code, and in lock step on one thread and two."""
-    robot, _ = completed(rd.load(name))
+    robot, _ = with_exact_right_angles(rd.load(name))
     q, v = np.random.default_rng((37, seed)).uniform(-0.5, 0.5, (2, TILE, robot.n))
     inertia = np.diag(robot.M(q[0]))  # gains in its units are as slow on every arm
     setup = rd.Setup(
@@ -154,7 +156,7 @@ def engines(name: str, seed: int) -> Iterator[Row]:
 
 
 def rows(name: str, seed: int) -> Iterator[Row]:
-    yield from batches(completed(rd.load(name))[0], seed)
+    yield from batches(with_exact_right_angles(rd.load(name))[0], seed)
     yield from caches(name, seed)
     yield from right_angles(name, seed)
     yield from engines(name, seed)

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.queries import FORWARD_DYNAMICS, M, N
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard import conditioning, far_out, sampled_control, tools
@@ -26,7 +26,7 @@ from tests.campaigns.hard.case import Case, Row
 
 TITLE = "The world"
 MATRIX = True
-MOST_JOINTS, SWING_S, HELD_S = 12, 0.3, 1.0
+MAX_JOINTS, SWING_S, HELD_S = 12, 0.3, 1.0
 LEAST = 0.3  # part of the true error that an estimate has to be
 ARMS = [
     "a1", "anymal_b", "anymal_c", "b1", "bolt", "borinot_flying_arm_2", "cart_pole", "double_pendulum",
@@ -122,7 +122,7 @@ COLUMNS: tuple[Column, ...] = (implementations, far, rows_of_a_batch, swing, hel
 
 def arm(name: str, seed: int) -> Iterator[Row]:
     """All columns of an arm; a refusal is a figure too."""
-    robot, _ = completed(rd.load(name))
+    robot, _ = with_exact_right_angles(rd.load(name))
     for column in COLUMNS:
         try:
             yield from column(name, robot, seed)
@@ -135,7 +135,7 @@ def left_out(seed: int) -> Iterator[Row]:
     there = []
     for name in rd.list_robots():
         with suppress(RobotDynError):  # what is refused is in docs/reference/findings.md
-            there += [name] * (rd.load(name).n <= MOST_JOINTS)
+            there += [name] * (rd.load(name).n <= MAX_JOINTS)
     yield Row("the catalog", "arms that are left out", float(len(set(there) - set(ARMS))), 0.0)
 
 

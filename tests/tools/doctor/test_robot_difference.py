@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from math import cos, pi
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from lxml import etree
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError, rotation, rotation_rpy, rpy_of
 from robot_dyn.tools.doctor import Basis, Obstacle, RobotDifference
+from robot_dyn.tools.doctor.coordinate_map import JointMap, laid_bodies
 from tests.command import run
 
 GRAVITY = float(-rd.load("planar_2r").gravity[2])  # [m/s²]
@@ -139,6 +141,42 @@ def test_signs_and_zero_offsets_are_found_from_the_axes(name: str) -> None:
         assert (maps[x].sign, maps[x].basis) == (s, Basis.AXES)
         assert maps[x].offset == pytest.approx(-s * c, abs=1e-9)
     assert difference.agrees
+
+
+def test_values_given_for_one_joint_change_no_other_joint() -> None:
+    """Neither a sign against the axes nor an offset moves the proposals of the other joints."""
+    a, root = rd.load("ur5"), tree("ur5")
+    for k, x in enumerate(a.joint_names):
+        rezeroed(root, x, (-1) ** k, 0.3 * k)
+    b = robot(root)
+    names = {x: x for x in a.joint_names}
+
+    def maps(**given: dict[str, float]) -> dict[str, JointMap]:
+        laid, obstacles = laid_bodies(a, b, names, given.get("signs", {}), given.get("offsets", {}))
+        assert not {row.joint for row in obstacles} & {joint for values in given.values() for joint in values}
+        return {body.map.a: body.map for body in laid}
+
+    proposed = maps()
+    for x, (_, _, s, o, _) in ((x, astuple(proposed[x])) for x in a.joint_names[::2]):
+        for given in ({"signs": {x: -s}}, {"signs": {x: s}}, {"offsets": {x: o + 0.4}}):
+            s_given, o_given = given.get("signs", {}).get(x, s), given.get("offsets", {}).get(x, o)
+            assert maps(**given) == proposed | {x: JointMap(x, x, s_given, o_given, Basis.GIVEN)}
+
+
+def test_equal_q_is_compared_without_proposals() -> None:
+    """The second file turns the shoulder lift the other way: its torques at equal q are those of another posture."""
+    a, root = rd.load("ur5"), tree("ur5")
+    rezeroed(root, "shoulder_lift_joint", -1, 0.0)
+    b = robot(root)
+    assert diff(a, b, tolerance=ROUNDED).agrees
+    same = diff(a, b, same_q=True)
+    assert not same.agrees and not same.unmapped
+    assert {(x.sign, x.offset, x.basis) for x in same.joints} == {(1, 0.0, Basis.GIVEN)}
+    assert [x.b for x in same.differences if x.joint == "shoulder_lift_joint" and x.unit == "deg"] == [(180.0,)]
+    for row in (x for x in same.largest if x.quantity == "N"):
+        j = a.joint_names.index(row.joint)
+        np.testing.assert_allclose((row.a, row.b), (a.N(row.q)[j], b.N(row.q)[j]), rtol=0, atol=ROUNDED)
+    assert diff(a, b, same_q=True, signs={"shoulder_lift_joint": -1}, tolerance=ROUNDED).agrees
 
 
 def a_structure(a: rd.Robot):
@@ -294,4 +332,4 @@ def test_the_command_exits_with_1_above_the_tolerance(tmp_path: Path) -> None:
 
     assert code("planar_2r", "planar_2r") == 0
     assert code("planar_2r", str(path)) == 1
-    assert code("planar_2r", str(path), "--tolerance", "2") == 0  # 0.1 kg · g · 1.4 m = 1.37 N m
+    assert code("planar_2r", str(path), "--tolerance", "2", "--same-q") == 0  # 0.1 kg · g · 1.4 m = 1.37 N m

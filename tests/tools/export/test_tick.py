@@ -17,14 +17,14 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen import SelfCheckError
 from robot_dyn.foundations import ExportError, QueryError
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.tools.export import CSource, c_source
 from tests.command import ROOT, run
 from tests.promised import check_document
 from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
 control = rd.control
-UR5, _ = completed(rd.load("ur5"))  # right angles in full, as in C
+UR5, _ = with_exact_right_angles(rd.load("ur5"))  # right angles in full, as in C
 START = np.array([0.1, -1.2, 1.0, -0.3, 0.5, 0.2])
 REFERENCE = control.quintic(START, START + np.array([0.8, 0.5, -0.7, 0.6, -0.5, 0.9]), 0.8)
 KP, KD = control.gains_from(np.diag(UR5.M(START)), 12.0)

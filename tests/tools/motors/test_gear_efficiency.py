@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import robot_dyn as rd
-from robot_dyn.foundations import PlanError, QueryError
+from robot_dyn.foundations import PlanError
 from robot_dyn.tools.motors import Motors, read_motors
 
 ROD = rd.load("simple_pendulum")
@@ -100,10 +100,31 @@ def test_a_path_is_within_the_torque_of_its_motors() -> None:
     assert fast.budget.fits
 
 
-def test_a_payload_is_not_solved_for_through_a_gear_with_losses() -> None:
-    budget: Any = rd.tools.motors.budget(rd.control.quintic([0.2], [1.4], 0.8), ROD, motors=MOTORS)
-    with pytest.raises(QueryError, match="payload="):
-        rd.tools.motors.max_payload(budget, ROD.frame_names[-1])
+@pytest.mark.parametrize(
+    ("limit", "peak"),
+    [("peak torque", 110.0), ("continuous torque", 999.0), ("break-away torque", 240.0), ("line", 130.0)],
+)
+def test_the_largest_payload_through_gears_is_the_mass_at_which_budgets_use_a_limit(limit: str, peak: float) -> None:
+    """The root of largest share − 1, over budgets with payloads; peaks between times are refined to 1e-9."""
+    arm = rd.load("planar_2r")
+    plan = rd.control.via_points([0.0, 0.6, 1.3, 2.0], [[0.2, 0.4], [1.3, -0.9], [-0.5, 0.3], [0.1, 1.2]])
+    plant = rd.Plant(arm, [rd.effects.DryFriction(4.0, 70.0)] if limit == "break-away torque" else [])
+    first, second = arm.joint_names
+    motors = Motors(
+        peak={first: peak, second: peak}, continuous={first: 60.0} if limit == "continuous torque" else {},
+        speed={first: 9.0, second: 9.0}, armature={first: 0.9, second: 0.3}, efficiency={first: 0.7, second: 0.8},
+        line=dict.fromkeys((first, second), ((0.5, peak), (20.0, 0.0))) if limit == "line" else {},
+    )  # fmt: skip
+    link, com = arm.frame_names[-1], (0.1, 0.0, 0.0)
+
+    def over(mass: float) -> float:
+        loaded = rd.tools.motors.budget(plan, plant, motors=motors, payload=rd.Payload(link, mass, com))
+        return max(used for joint in loaded.joints for used in joint.shares.values()) - 1
+
+    most = rd.tools.motors.max_payload(rd.tools.motors.budget(plan, plant, motors=motors), link, com)
+    assert most.mass == pytest.approx(brentq(over, 1e-3, 20.0), rel=1e-7)
+    assert most.limit == ("peak torque" if limit == "line" else limit)
+    assert most.largest_share == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(

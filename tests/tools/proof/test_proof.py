@@ -19,7 +19,7 @@ from robot_dyn.codegen import program_of
 from robot_dyn.control import polynomial
 from robot_dyn.foundations import ProofError, QueryError, with_values
 from robot_dyn.lagrange.exact import RoundedLiterals
-from robot_dyn.model import completed
+from robot_dyn.model import with_exact_right_angles
 from robot_dyn.tools.proof.enclosure import step as steps
 from robot_dyn.tools.proof.enclosure import tube as tubes
 from robot_dyn.tools.proof.enclosure.balls import Inverse, NotProvenError, between, exact, largest, matrix, upper
@@ -169,8 +169,8 @@ def test_a_theorem_says_which_numbers_it_is_about() -> None:
     floats = proof(robot, 0.01, 100, q0=[float(x) for x in GENERAL_Q[:6]], v0=[float(x) for x in GENERAL_V[:6]])
     g = robot.edits.gravity
     heavier = proof(robot.with_(gravity=(0.0, 0.0, nextafter(g[2], -10))), 0.01, 100)
-    turned = proof(completed(robot)[0], 0.01, 100)
-    assert completed(robot)[1]
+    turned = proof(with_exact_right_angles(robot)[0], 0.01, 100)
+    assert with_exact_right_angles(robot)[1]
     for other in (floats, heavier, turned):
         pairs = zip(decimals.at(0.01)[0], other.at(0.01)[0], strict=True)
         assert not all(x.overlaps(y) for x, y in pairs)

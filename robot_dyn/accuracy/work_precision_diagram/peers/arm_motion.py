@@ -51,7 +51,7 @@ class ArmMotion:
 
     def __post_init__(self) -> None:
         if not isinstance(self.setup.plant.dynamics, Robot):
-            raise PeerError("they need a robot from a file")
+            raise PeerError("the dynamics are not those of a robot file")
         for effect in self.setup.plant.effects:
             if not isinstance(effect, (*_JOINT_EFFECTS, LineSpring, LineDamper)):
                 raise PeerError(f"the effect {effect.name} is not supported")
@@ -163,7 +163,7 @@ class ArmMotion:
 
 
 def desired_motion(reference: PiecewisePolynomial) -> Callable[[float], np.ndarray]:
-    """Return a function of time for q_d and v_d, (2, n), by powers of s = t − tᵢ.
+    """Return a function of time that returns q_d and v_d, (2, n), from powers of s = t − tᵢ.
 
     It takes less than half the time of `reference.at`, which checks t.
     """

@@ -21,20 +21,24 @@ _RESTS = 1e-9  # relative to the largest velocity of a joint: slower is rest
 
 
 class Breakaway(NamedTuple):
-    """Torques τ_b, with the index of the joint and the time in [s], all (b,)."""
+    """Torques τ_b with the index of the joint, the time in [s], the sign of v⁺ and the acceleration, all (b,)."""
 
     joint: np.ndarray
     t: np.ndarray
     torque: np.ndarray
+    direction: np.ndarray
+    a: np.ndarray
 
 
-NO_BREAKAWAY = Breakaway(np.zeros(0, int), np.zeros(0), np.zeros(0))
+NO_BREAKAWAY = Breakaway(np.zeros(0, int), *np.zeros((4, 0)))
 
 
 def static_friction(plant: Plant) -> np.ndarray:
     """Return the static friction f_s of each joint, (n,), in [N m] or [N]."""
     n = plant.dynamics.n
-    most = [force.at_rest(np.zeros(n)).most for force in plant.forces if isinstance(force, SetValued) and force.rubs]
+    most = [
+        force.at_rest(np.zeros(n)).most for force in plant.forces if isinstance(force, SetValued) and force.has_friction
+    ]
     return np.sum(most, axis=0) if most else np.zeros(n)
 
 
@@ -51,9 +55,9 @@ def breakaway(cells: Cells, plant: Plant, gear: Gear | None = None) -> Breakaway
     states = cells.states(cell, np.full(len(cell), -1.0))
     split = torques_by_cause(plant, *states)
     forces = zip(numbered(*(force.name for force in plant.forces)), plant.forces, strict=True)
-    dry = [split.torques[name] for name, force in forces if isinstance(force, SetValued) and force.rubs]
+    dry = [split.torques[name] for name, force in forces if isinstance(force, SetValued) and force.has_friction]
     row = np.arange(len(cell))
     tau, direction = split.tau - np.sum(dry, axis=0), np.sign(middle[cell])
     tau += friction * direction
     tau += 0.0 if gear is None else gear.loss(tau, direction, states[3])
-    return Breakaway(joint, split.t, tau[row, joint])
+    return Breakaway(joint, split.t, *(x[row, joint] for x in (tau, direction, states[3])))

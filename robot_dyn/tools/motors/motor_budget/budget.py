@@ -15,6 +15,7 @@ from robot_dyn.foundations import PlanError, QueryError, instance, shown
 from robot_dyn.report import processor_and_versions
 from robot_dyn.simulation import Ending, RemarkKind, remark_lines, robot_of
 from robot_dyn.tools.motors.limits import Limits, check_motors, limits_of, outside_positions, same_rotor
+from robot_dyn.tools.motors.motor_budget import bearing_loads
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
 from robot_dyn.tools.motors.motor_budget.holding import holdings
 from robot_dyn.tools.motors.motor_budget.joint_budget import JointBudget, joint_budgets
@@ -49,7 +50,7 @@ def budget(
         τ_motor = J a + (τ − J a) η^−s,    s = sign((τ − J a) v),    J the rotor at the joint
 
     A rotor inertia in `motors` acts as armature if the arm has none. A run that simulates
-    gears has its own rotors; those in `motors` must agree to 1 %.
+    gears has its own rotors; those in `motors` must agree to 1 %. Loads on bearings are those of `joint_wrenches`.
 
     Args:
         motion: A plan, a `PiecewisePolynomial`, or a run of `rd.simulate`.
@@ -63,7 +64,7 @@ def budget(
 
     Raises:
         QueryError: If the motion has other joints, or a run is passed with a plant or a payload, has diverged or cannot
-            be split by cause.
+            be split by cause, or bearings with limits have unknown loads.
         PlanError: If a limit is invalid, or a rotor differs from the arm's.
         EffectError: If an effect has states, which a plan does not determine: pass a run.
 
@@ -126,14 +127,16 @@ def of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, limits:
             f" {robot.n}, {', '.join(robot.joint_names)}; use a motion of this arm"
         )
     demand = of_motion(reference, plant, limits)
+    assert demand.cells is not None
+    bearings = bearing_loads.of_plan(demand.cells, plant, limits.bearing)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
-    findings = [*robot.announced_findings, *(() if plan is None else plan.findings), *outside]
+    findings = [*robot.announced_findings, *limits.findings, *(() if plan is None else plan.findings), *outside]
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):
         findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(
         robot, "motion" if plan is None else plan.method, demand,
-        tuple(joint_budgets(demand, limits, holdings(robot, limits.brake))),
-        sources, findings, [], (plant, reference, limits),
+        tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), bearings)),
+        sources, findings, bearings.left_out, (plant, reference, limits),
     )  # fmt: skip
 
 
@@ -144,12 +147,15 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     limits = limits_of(Plant(robot), motors, **given)
     demand = of_run(run, limits.gear)
     cut = frozenset(remark.joint for remark in run.remarks if remark.kind in _CUT)
-    joints = tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), cut))
+    bearings = bearing_loads.of_run(run, robot, limits.bearing)
+    joints = tuple(joint_budgets(demand, limits, holdings(robot, limits.brake), bearings, cut))
     reported = *_CUT, RemarkKind.COARSE
-    findings = remark_lines(remark for remark in run.remarks if remark.kind in reported)
+    remarks = remark_lines(remark for remark in run.remarks if remark.kind in reported)
+    findings = [*limits.findings, *remarks, *bearings.findings]
     if run.outcome.ending == Ending.STOPPED:
         findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget covers the simulated part")
     left = ["torque at which joints break away: a run does not contain its static friction"]
+    left += bearings.left_out
     if driven := [name for name in run.effect_torques or {} if name.startswith(_DRIVES)]:
         left.append(f"power at the motors of {', '.join(driven)}, which turn at other speeds than their joints")
     if simulated:
@@ -219,7 +225,7 @@ def _budget(
         limits=limits,
         resolution=demand.resolution,
         error=demand.error,
-        findings=(*findings, *not_judged),
+        findings=tuple(dict.fromkeys((*findings, *not_judged))),
         left_out=tuple(left_out),
         environment=processor_and_versions(("robot-dyn", "pin", "numpy")),
         demand=demand,

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final
@@ -19,6 +20,8 @@ from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, turning_points
 
 FEWEST = 400  # smallest number of cells of a motion
+PEAKS = 4  # number of local maxima of a quantity that are refined
+_POINTS = 9  # points of a round of refinement
 _NEAR = 1e-12  # relative to a cell: places at its ends lie this far inside, where friction has its sign
 _RESTS, _NOTHING = 1e-9, 1e-300  # relative velocity whose sign may be rounding; a velocity that has only a sign
 _CLOSE = 1e-6  # relative to a piece: a reversal nearer to its end is at the end, where the velocity has a multiple root
@@ -51,6 +54,12 @@ class Cells:
         """Length of each cell, (c,), in [s]."""
         return self.t1 - self.t0
 
+    @property
+    def nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cells and places of the nodes of the rule, (9 c,) each."""
+        count = len(self.piece)
+        return np.repeat(np.arange(count), len(X)), np.tile(X, count)
+
     @cached_property
     def _middle(self) -> np.ndarray:
         """Time from the start of the piece to the middle of each cell, (c,), in [s]."""
@@ -73,6 +82,31 @@ class Cells:
         v = np.where(noise, _NOTHING * np.sign(middle), v)  # a joint that comes to rest does not reverse first
         t = np.clip(start + s, self.t0[cell], np.nextafter(self.t1[cell], -np.inf))
         return t, q, v, a
+
+    def closer(
+        self, values: np.ndarray, sizes: Callable[[np.ndarray, np.ndarray], np.ndarray], rounds: int = 7
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return cells and places near the largest values of each column, (k,) each.
+
+        Args:
+            values: Values at the nodes, (9 c, m).
+            sizes: Function from cells and places, (k,) each, to values, (k, m).
+            rounds: Rounds of refinement; a round divides distances by 4.
+        """
+        y = values.reshape(len(self.piece), len(X), -1)
+        padded = np.pad(y, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
+        highest = np.where((y >= padded[:, :-2]) & (y >= padded[:, 2:]), y, -np.inf).reshape(-1, y.shape[-1])
+        rows = np.argsort(-highest, axis=0, kind="stable")[:PEAKS]
+        column = np.tile(np.arange(y.shape[-1]), len(rows))
+        cell, node = np.divmod(rows.ravel(), len(X))
+        row = np.arange(len(cell))
+        low, best, high = X[np.maximum(node - 1, 0)], X[node], X[np.minimum(node + 1, len(X) - 1)]
+        for _ in range(rounds):
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _POINTS)
+            refined = sizes(np.repeat(cell, _POINTS), x.ravel()).reshape(len(cell), _POINTS, -1)
+            k = refined[row, :, column].argmax(axis=1)
+            best, low, high = x[row, k], x[row, np.maximum(k - 1, 0)], x[row, np.minimum(k + 1, _POINTS - 1)]
+        return cell, best
 
 
 def cells(motion: PiecewisePolynomial, plant: Plant, gear: Gear | None) -> Cells:

@@ -20,10 +20,7 @@ from robot_dyn.simulation import Ending
 from robot_dyn.tools.motors.gear import Gear, with_loss
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.breakaway import NO_BREAKAWAY, Breakaway, breakaway, static_friction
-from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
-
-_PEAKS = 4  # number of local maxima of a quantity that are refined
-_ROUNDS, _POINTS = 7, 9  # rounds of refinement, and points of each: a round divides distances by 4
+from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, PEAKS, Cells, X, cells
 
 
 @final
@@ -102,10 +99,14 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None =
             )
     gear = limits and limits.gear
     grid = cells(motion, plant, gear)
-    count = len(grid.piece)
-    cell, x = np.repeat(np.arange(count), len(X)), np.tile(X, count)
-    tau, v = torques(grid, plant, cell, x, gear)
-    closer = _closer(grid, plant, tau, v, limits)
+
+    def sizes(cell: np.ndarray, x: np.ndarray) -> np.ndarray:
+        tau, v = torques(grid, plant, cell, x, gear)
+        used = () if limits is None or limits.line is None else (limits.used(tau, v),)
+        return np.concatenate([np.abs(tau), np.abs(tau * v), *used], axis=1)
+
+    cell, x = grid.nodes
+    closer = grid.closer(sizes(cell, x), sizes)
     cell, x = np.concatenate([cell, closer[0]]), np.concatenate([x, closer[1]])
     rules = [
         np.concatenate([np.outer(grid.length / 2, rule).ravel(), np.zeros(len(closer[0]))]) for rule in (KRONROD, GAUSS)
@@ -124,7 +125,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant, limits: Limits | None =
         coarse=rules[1][order],
         peak=np.abs(split.tau).max(axis=0),
         speed=(fastest.largest, at),
-        resolution=f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {_PEAKS}"
+        resolution=f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {PEAKS}"
         " largest of each joint",
         friction=static_friction(plant),
         starts=breakaway(grid, plant, gear),
@@ -148,37 +149,9 @@ def torques(
 def root_mean_squares(motion: PiecewisePolynomial, plant: Plant, gear: Gear | None) -> np.ndarray:
     """Compute √(1/T ∫ τ² dt) of each motor along a motion, (n,), in [N m] or [N]."""
     grid = cells(motion, plant, gear)
-    count = len(grid.piece)
-    tau, _ = torques(grid, plant, np.repeat(np.arange(count), len(X)), np.tile(X, count), gear)
+    tau, _ = torques(grid, plant, *grid.nodes, gear)
     weights = np.outer(grid.length / 2, KRONROD).ravel()
     return np.sqrt(weights @ tau**2 / weights.sum())
-
-
-def _closer(
-    cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray, limits: Limits | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return cells and places of the largest |τ|, |τ v| and used fraction of limits of each joint, refined."""
-
-    def sizes(tau: np.ndarray, v: np.ndarray) -> np.ndarray:
-        used = () if limits is None or limits.line is None else (limits.used(tau, v),)
-        return np.concatenate([np.abs(tau), np.abs(tau * v), *used], axis=1)
-
-    y = sizes(tau, v).reshape(len(cells.piece), len(X), -1)
-    padded = np.pad(y, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
-    highest = np.where((y >= padded[:, :-2]) & (y >= padded[:, 2:]), y, -np.inf).reshape(-1, y.shape[-1])
-    rows = np.argsort(-highest, axis=0, kind="stable")[:_PEAKS]
-    column = np.tile(np.arange(y.shape[-1]), len(rows))
-    cell, node = np.divmod(rows.ravel(), len(X))
-    low, high = X[np.maximum(node - 1, 0)], X[np.minimum(node + 1, len(X) - 1)]
-    best = X[node]
-    for _ in range(_ROUNDS):
-        x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _POINTS)
-        torque, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel(), limits and limits.gear)
-        all_of = sizes(torque, speed).reshape(len(cell), _POINTS, -1)
-        k = all_of[np.arange(len(cell)), :, column].argmax(axis=1)
-        row = np.arange(len(cell))
-        best, low, high = x[row, k], x[row, np.maximum(k - 1, 0)], x[row, np.minimum(k + 1, _POINTS - 1)]
-    return cell, best
 
 
 def of_run(run: Trajectory, gear: Gear | None) -> Demand:

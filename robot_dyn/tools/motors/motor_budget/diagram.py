@@ -27,6 +27,7 @@ _SHADES = {
     "speed": 0.46,
     "line": 0.3,
     "brake": 0.18,
+    "bearing": 0.1,
 }  # shades of ink for bars; colours mark causes
 
 

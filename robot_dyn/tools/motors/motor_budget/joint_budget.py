@@ -13,6 +13,7 @@ import numpy as np
 from robot_dyn.foundations import reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits, used_fraction
+from robot_dyn.tools.motors.motor_budget.bearing_loads import BearingLoads, Bearings
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.holding import Holding
 
@@ -20,7 +21,7 @@ TOLERANCE = 1e-3  # relative to a limit, by which plans at their limits may exce
 _DIGITS = 12  # decimals of times in [s]: places at the ends of cells lie slightly inside
 KINDS: Mapping[str, str] = {
     "peak": "peak torque", "continuous": "continuous torque", "speed": "speed", "line": "torque–speed line",
-    "brake": "brake",
+    "brake": "brake", "bearing": "bearing",
 }  # fmt: skip
 
 
@@ -47,6 +48,7 @@ class JointBudget:
         line: Largest use of the torque–speed line: "torque" in [N m], "speed" in [rad/s], "limit" at that speed,
             "used", the fraction, and "at_s" in [s]; empty without a line.
         holding: The brake, and the torque of gravity that it holds; None without a brake.
+        bearing: Largest loads on its bearing; None if they are unknown.
         cut: True if an effort limit or a torque–speed line cut the actuation of a run, so that the demand was higher.
     """
 
@@ -72,17 +74,19 @@ class JointBudget:
     of_rms: dict[str, float]
     line: dict[str, float] = field(default_factory=dict)
     holding: Holding | None = None
+    bearing: BearingLoads | None = None
     cut: bool = False
 
     @property
     def shares(self) -> dict[str, float]:
-        """Used fractions of the limits "peak", "continuous" and "speed", of a "line" and a "brake"; 0 if unknown."""
+        """Used fractions of limits: "peak", "continuous", "speed", 0 if unknown, and "line", "brake" and "bearing"."""
         peak = max(self.peak, 0.0 if isnan(self.breakaway) else self.breakaway)
         demand = np.array([peak, self.rms, self.speed])
         limit = np.array([self.peak_limit, self.continuous_limit, self.speed_limit])
         used = dict(zip(KINDS, used_fraction(demand, limit).tolist(), strict=False))
         used |= {"line": self.line["used"]} if self.line else {}
-        return used | ({"brake": self.holding.gravity / self.holding.brake} if self.holding else {})
+        used |= {"brake": self.holding.gravity / self.holding.brake} if self.holding else {}
+        return used | ({"bearing": self.bearing.used} if self.bearing and self.bearing.used else {})
 
     @reported
     def headroom(self) -> dict[str, float]:
@@ -91,7 +95,7 @@ class JointBudget:
 
     @reported
     def too_small(self) -> tuple[str, ...]:
-        """Limits that are exceeded by more than a thousandth: "peak", "continuous", "speed", "line" or "brake".
+        """Exceeded limits, by more than a thousandth: "peak", "continuous", "speed", "line", "brake" or "bearing".
 
         A limit at which the actuation was cut is included.
         """
@@ -111,6 +115,8 @@ class JointBudget:
             return f"{needs} (limit {self.line['limit']:.4g} there) at {self.line['at_s']:.4g} s"
         if kind == "brake" and self.holding:
             return f"{self.holding.gravity:.4g} {unit} to hold against gravity (limit {self.holding.brake:.4g})"
+        if kind == "bearing" and self.bearing:
+            return self.bearing.says
         starts = self.breakaway > self.peak
         need, at = (self.breakaway, self.breakaway_at_s) if starts else (self.peak, self.peak_at_s)
         more = " to break away" if starts else ", where it was cut" if self.cut else ""
@@ -118,8 +124,9 @@ class JointBudget:
 
 
 def joint_budgets(
-    demand: Demand, limits: Limits, holding: Mapping[str, Holding], cut: frozenset[str] = frozenset()
-) -> Iterator[JointBudget]:
+    demand: Demand, limits: Limits, holding: Mapping[str, Holding], bearings: Bearings,
+    cut: frozenset[str] = frozenset(),
+) -> Iterator[JointBudget]:  # fmt: skip
     """Yield the budget of each joint; `cut` names joints whose actuation was cut at an effort limit."""
     split, power, row = demand.split, demand.power, np.arange(len(demand.peak))
     limits = limits.at_mean_speed(demand.mean_speed)
@@ -128,7 +135,7 @@ def joint_budgets(
     delivered, regenerated = (demand.duration_s * demand.mean(x.clip(0.0)) for x in (power, -power))
     at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
     parts = {cause: demand.mean(torque * split.tau) for cause, torque in split.torques.items()}
-    by_joint = [[(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i] for i in row]
+    by_joint = [[(abs(tau), t) for joint, t, tau, *_ in zip(*demand.starts, strict=True) if joint == i] for i in row]
     starts = [max(torques, key=itemgetter(0), default=(nan, nan)) for torques in by_joint]
     values: dict[str, Sequence[float] | np.ndarray] = {
         "peak": demand.peak,
@@ -158,6 +165,7 @@ def joint_budgets(
             of_rms={cause: float(part[i] / rms[i]) if rms[i] else 0.0 for cause, part in parts.items()},
             line=lines[i],
             holding=holding.get(name),
+            bearing=bearings.by_joint.get(name),
             cut=name in cut,
         )
 

@@ -6,6 +6,10 @@
 
 Each inequality allows an interval of m, and so do all together: every mass between two that fit also fits. Speed does
 not depend on m. Peaks between the times are computed with the current mass and added until no limit is exceeded.
+
+A gear with losses is affine on either side of τ = J a, and increases: the limits of the motor have limits of τ at each
+time. The mean square is then quadratic in m between masses at which a sign changes; its root is found with the signs
+there.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ import numpy as np
 from robot_dyn import Payload, Plant
 from robot_dyn.description import LARGEST
 from robot_dyn.foundations import Answer, Block, QueryError
+from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.limits import Limits, used_fraction
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques
@@ -108,8 +113,6 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     """
     plant, motion, limits = case_of(motor_budget, "the largest payload")
     robot: Any = plant.dynamics
-    if limits.gear is not None:
-        raise QueryError("the torque of motors with gear losses is not affine in the mass of the payload; " + _INSTEAD)
     unit, bare = Payload(link, 1.0, com), of_motion(motion, plant, limits)
     limits = limits.at_mean_speed(bare.mean_speed)
     carried = float(sum(payload.mass for payload in robot.edits.payloads))
@@ -126,7 +129,7 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     if (fast := bare.speed[0] > limits.velocity * (1 + TOLERANCE)).any():
         i = int(np.argmax(fast))
         return result(None, 0.0, _Bound(nan, nan, i, "speed", float(bare.speed[1][i])), inf)
-    bounds = [none, *_of_means(bare, loaded, limits), *_of_starts(bare, loaded, limits)]
+    bounds = [none, *_of_means(bare, plant, loaded, limits), *_of_starts(bare, plant, loaded, limits)]
     bounds += _of_times(bare, plant, loaded, limits, 0.0)
     for turn in count(1):
         low, high = max(bounds, key=lambda x: x.least), min(bounds, key=lambda x: x.most)
@@ -151,33 +154,43 @@ def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: 
     """
     assert there.cells is not None
     bare, one = (torques(there.cells, x, there.cell, there.x)[0] for x in (plant, loaded))
-    per_mass = one - bare
+    per_mass, a = one - bare, there.cells.states(there.cell, there.x)[3]
+    tau = bare + mass * per_mass
     size = np.abs(bare).max() + mass * np.abs(per_mass).max()
-    if np.abs(bare + mass * per_mass - there.split.tau).max() > _AFFINE * size:
+    loss = 0.0 if limits.gear is None else limits.gear.loss(tau, there.v, a)
+    if np.abs(tau + loss - there.split.tau).max() > _AFFINE * size:
         raise QueryError(
             "the torque is not affine in the mass of the payload: an effect depends on the dynamics of the arm; "
             + _INSTEAD
         )
     m, n = bare.shape
     joints, t = np.tile(np.arange(n), m), np.repeat(there.split.t, n)
-    bounds = tuple(x.ravel() for x in limits.bounds(there.v))
-    yield from _of_torques("peak torque", joints, t, bare.ravel(), per_mass.ravel(), bounds)
+    bounds = (_at_joint(limits.gear, x, there.v, a).ravel() for x in limits.bounds(there.v))
+    yield from _of_torques("peak torque", joints, t, bare.ravel(), per_mass.ravel(), *bounds)
 
 
-def _of_starts(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
+def _of_starts(bare: Demand, plant: Plant, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
     """Yield the bounds of the torque at which joints break away."""
     assert bare.cells is not None
-    joints, t, tau = bare.starts
-    bounds = -limits.effort[joints], limits.effort[joints]
-    yield from _of_torques("break-away torque", joints, t, tau, breakaway(bare.cells, loaded).torque - tau, bounds)
+    joints, t, tau, direction, a = breakaway(bare.cells, plant)
+    per_mass = breakaway(bare.cells, loaded).torque - tau
+    gear, effort = limits.gear and limits.gear.of(joints), limits.effort[joints]
+    bounds = (_at_joint(gear, x, direction, a) for x in (-effort, effort))
+    yield from _of_torques("break-away torque", joints, t, tau, per_mass, *bounds)
+
+
+def _at_joint(gear: Gear | None, tau: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Return the torques of joints for torques of their motors."""
+    return tau if gear is None else gear.at_joint(tau, v, a)
 
 
 def _of_torques(
-    name: str, joints: np.ndarray, t: np.ndarray, tau: np.ndarray, slope: np.ndarray, bounds: tuple[np.ndarray, ...]
-) -> Iterator[_Bound]:
+    name: str, joints: np.ndarray, t: np.ndarray, tau: np.ndarray, slope: np.ndarray, lower: np.ndarray,
+    upper: np.ndarray,
+) -> Iterator[_Bound]:  # fmt: skip
     """Yield, for each joint, the narrowest bounds of lower ≤ τ + m slope ≤ upper; all arrays are (k,)."""
     flat = np.abs(slope) <= _NONE * np.abs(slope).max(initial=0.0)
-    (lower, upper), steep = bounds, np.where(flat, 1.0, slope)
+    steep = np.where(flat, 1.0, slope)
     none = np.where((tau < lower) | (tau > upper), inf, -inf)
     ends = (lower - tau) / steep, (upper - tau) / steep
     least, most = np.where(flat, none, np.minimum(*ends)), np.where(flat, -none, np.maximum(*ends))
@@ -188,20 +201,41 @@ def _of_torques(
         yield _Bound(-inf, float(most[high]), int(i), name, float(t[high]))
 
 
-def _of_means(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
+def _of_means(bare: Demand, plant: Plant, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
     """Yield the bounds of continuous torque, a quadratic inequality in the mass for each joint."""
     assert bare.cells is not None
-    tau = bare.split.tau
-    per_mass = torques(bare.cells, loaded, bare.cell, bare.x)[0] - tau
-    A, B, C = (bare.mean(x * y) for x, y in ((tau, tau), (tau, per_mass), (per_mass, per_mass)))
+    tau, one = (torques(bare.cells, x, bare.cell, bare.x)[0] for x in (plant, loaded))
+    per_mass, a = one - tau, bare.cells.states(bare.cell, bare.x)[3]
+    nothing = _NONE**2 * bare.mean(per_mass**2).max()
     for i in np.flatnonzero(np.isfinite(limits.continuous)):
-        over = A[i] - limits.continuous[i] ** 2
-        root = B[i] ** 2 - C[i] * over
-        if C[i] <= _NONE**2 * C.max():
-            least, most = (inf, -inf) if over > 0 else (-inf, inf)
-        else:
-            least, most = (-B[i] + np.array([-1, 1]) * np.sqrt(root)) / C[i] if root >= 0 else (inf, -inf)
-        yield _Bound(float(least), float(most), int(i), "continuous torque")
+        gear = limits.gear and limits.gear.of(i)
+        least, most = (
+            _end_of_mean(bare, gear, side, limits.continuous[i], nothing, [x[:, i] for x in (tau, per_mass, bare.v, a)])
+            for side in (-1, 1)
+        )
+        yield _Bound(least, most, int(i), "continuous torque")
+
+
+def _end_of_mean(
+    bare: Demand, gear: Gear | None, side: int, limit: float, nothing: float, columns: list[np.ndarray]
+) -> float:
+    """Return the smallest or largest mass, by side, with which the mean square is within a limit; −side inf if none."""
+    tau, per_mass, v, a = columns
+    mass = root = 0.0
+    for _ in range(_ROUNDS):
+        start, slope = tau, per_mass
+        if gear is not None:  # with the signs at the last mass
+            factor = gear.factor(tau + mass * per_mass, v, a)
+            start, slope = gear.rotor * a + factor * (tau - gear.rotor * a), factor * per_mass
+        A, B, C = (float(bare.mean(x * y)) for x, y in ((start, start), (start, slope), (slope, slope)))
+        over = A - limit**2
+        if nothing >= C:
+            return -side * inf if over > 0 else side * inf
+        root, last = B**2 - C * over, mass
+        mass = (-B + side * max(root, 0.0) ** 0.5) / C
+        if mass == last:
+            break
+    return mass if root >= 0 else -side * inf
 
 
 def _share(demand: Demand, limits: Limits) -> float:

@@ -14,6 +14,7 @@ from robot_dyn.queries import of_joint, without_rounding
 from robot_dyn.report import Result
 from robot_dyn.tools.motors.gear import LOSS
 from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.motor_budget.bearing_loads import FIGURES, LOADS
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 
@@ -40,6 +41,7 @@ class MotorBudget(Result):
     columns: ClassVar[tuple[str, ...]] = (
         "joint", "unit", "peak", "peak_at_s", "peak_limit", "rms", "continuous_limit", "speed", "speed_at_s",
         "speed_limit", "power", "mean_power", "energy", "regenerated", "breakaway",
+        *FIGURES,
     )  # fmt: skip
     robot: str
     motion: str
@@ -75,7 +77,7 @@ class MotorBudget(Result):
         if not share:
             return "no limits are known, so the motors cannot be checked"
         verdict = "the motors suffice" if not self._unknown else "the motors suffice where limits are known"
-        return f"{verdict}; {nearest.joint} is nearest to its {KINDS[kind]}, {nearest.says(kind)} ({share:.0%})"
+        return f"{verdict}; the largest use is {share:.0%}: {KINDS[kind]} of {nearest.joint}, {nearest.says(kind)}"
 
     @property
     def _unknown(self) -> list[str]:
@@ -85,7 +87,9 @@ class MotorBudget(Result):
     @property
     def rows(self) -> Iterator[Mapping[str, object]]:
         """A row for each joint."""
-        return (vars(joint) | {"unit": of_joint("N m", joint.type)} for joint in self.joints)
+        for joint in self.joints:
+            loads = {} if joint.bearing is None else vars(joint.bearing)
+            yield vars(joint) | loads | {"unit": of_joint("N m", joint.type)}
 
     def tables(self) -> Iterator[Block]:
         joints = self.joints
@@ -142,6 +146,15 @@ class MotorBudget(Result):
                     "factor": [f"{y.factor:.2f}" for _, y in brakes],
                 }
             )
+            yield ""
+        if bearings := [(x.joint, x.bearing) for x in joints if x.bearing]:
+            yield "largest loads on bearings at the joint's origin; torsion, or force along a slide, is the drive's:"
+            heads = (head for load, unit in LOADS.items() for head in (f"{load} [{unit}]", "at [s]"))
+            used = [f"{y.used:.1%}" if y.used else "—" for _, y in bearings]
+            rows = (
+                (joint, *(getattr(y, key) for key in FIGURES), x) for (joint, y), x in zip(bearings, used, strict=True)
+            )
+            yield Table(("joint", *heads, "used"), tuple(rows), digits=4, right=("used",))
             yield ""
         yield "torque by cause at the peak:"
         yield _table(torque | at_peak | _by_cause("torque", [x.of_peak for x in joints]))

@@ -99,7 +99,8 @@ def planned(plant: Plant, limits: Limits, points: JointValues | PiecewisePolynom
     at_limits = float((use.largest >= BINDS).mean())
     moves = np.any(geometry.coefficients[:, 1:], axis=(0, 1))
     free = [name for i, name in enumerate(names) if moves[i] and np.isinf(limits.effort[i])]
-    findings = [f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free]
+    unlimited = (f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free)
+    findings = [*limits.findings, *unlimited]
     if at_limits < _ENOUGH:
         findings.append(f"no limit binds for {1 - at_limits:.1%} of the time: a faster motion may exist")
     robot: Any = plant.dynamics

@@ -1,4 +1,4 @@
-"""Objects that answer an unknown attribute by the nearest names."""
+"""Suggestions in errors about unknown attributes."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.foundations.errors import nearest
 
 
-class NamesNearest:
-    """An object that answers an unknown attribute by the names of the nearest ones."""
+class SuggestsNames:
+    """An object whose error about an unknown attribute suggests similar public names."""
 
     if not TYPE_CHECKING:  # so that a type checker reports unknown names
 
         def __getattr__(self, name: str) -> Any:
             if name.startswith("_") or hasattr(type(self), name):
-                return object.__getattribute__(self, name)  # raises the error of a property, or the usual one
+                return object.__getattribute__(self, name)  # raises the property's own error, or the usual one
             raise AttributeError(_unknown(type(self), name))
 
 
-@lru_cache(256)  # code that probes for an attribute does so often
+@lru_cache(256)  # some libraries probe for the same attribute again and again
 def _unknown(kind: type, name: str) -> str:
     """Return the message about an unknown attribute."""
     names = {*dir(kind), *getattr(kind, "__dataclass_fields__", ())}
