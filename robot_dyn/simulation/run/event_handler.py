@@ -42,7 +42,7 @@ class EventHandler:
         state: The state of the run.
         control: Control of the steps; it chooses a new first step if the equation changes.
         degree: Degree of the dense output.
-        thresholds: True to end steps at the thresholds of effects; otherwise the effects switch within steps.
+        thresholds: True to find the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to give up where events accumulate, instead of ending the run.
 
     Attributes:

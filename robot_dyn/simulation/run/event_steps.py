@@ -46,7 +46,7 @@ class EventSteps:
         mesh: Times at which steps end, (k,), in [s]; None for error control alone.
         samples: True to record samples; False for a companion run, which passes terminal events.
         max_evaluations: Evaluations after which the run gives up as `TooLong`.
-        thresholds: True to end steps at the thresholds of effects; otherwise the effects switch within steps.
+        thresholds: True to find the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to give up as `Stiff` or `Accumulation` where another method is better suited.
 
     Attributes:
