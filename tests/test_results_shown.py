@@ -30,7 +30,7 @@ CELLS = {
     "certify": "rd.accuracy.certify(arm, samples=100, repeats=1)",
     "cost": "rd.accuracy.cost(arm, q, budget_s=0.1, repeats=2)",
     "work_precision": "rd.accuracy.work_precision(rd.Setup(rd.Plant(arm), q, duration_s=0.1),"
-    " methods=['RK4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
+    " methods=['RK4', 'DOP853'], peers=False, budget_s=2.0, repeats=1)",
     "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=1.0)",
     "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
     "identify": "rd.tools.identify.identify(logs.FILE, logs.log(), reference=logs.reference())",
