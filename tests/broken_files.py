@@ -135,6 +135,14 @@ BROKEN: dict[str, Broken] = {
         _of("elbow", 'velocity="3"', 'velocity="-3"', "joint"), "limit_negative", "joint 'elbow'", True
     ),
     "equal limits": Broken(_of("elbow", 'lower="-2.5"', 'lower="2.5"', "joint"), "limits_equal", "joint 'elbow'"),
+    "soft limits crossed": Broken(
+        _of("elbow", "<limit", '<safety_controller soft_lower_limit="1" soft_upper_limit="-1"/><limit', "joint"),
+        "soft_limits", "joint 'elbow'",
+    ),
+    "soft limits outside": Broken(
+        _of("elbow", "<limit", '<safety_controller soft_lower_limit="-1" soft_upper_limit="2.6"/><limit', "joint"),
+        "soft_limits", "joint 'elbow'",
+    ),
     "shape in mm": Broken(
         _of("hand", 'box size="0.05 0.07 0.12"', 'box size="50 70 120"'), "shape_in_mm", "link 'hand'"
     ),

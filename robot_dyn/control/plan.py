@@ -14,7 +14,7 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.values import ReadOnly
-from robot_dyn.queries.units import of_joint
+from robot_dyn.queries.units import of_joint, without_rounding
 
 _ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 _PER = {"velocity": "[/s]", "acceleration": "[/s²]", "jerk": "[/s³]"}
@@ -58,7 +58,7 @@ class Plan(Answer, ReadOnly):
         yield f"{self.arm}: {self.method}"
         after = f" from {self.reference.start_s:g} s" if self.reference.start_s else ""
         yield f"{self.duration_s:.6g} s{after}, {len(self.reference.coefficients)} polynomials"
-        start, end = self.reference.at(np.array([self.reference.start_s, self.reference.end_s]))[0]
+        start, end = without_rounding(self.reference.at(np.array([self.reference.start_s, self.reference.end_s]))[0])
         shown = [name for name in _ORDERS if name in self.limits or name != "jerk"]
         columns = [self._cells(name) for name in shown]
         units = [of_joint("rad", kind) for kind in self.joint_types]

@@ -1,7 +1,5 @@
 """The catalog: maps a name, a path or a package:// address to a URDF file.
 
-The names are those of the files in `urdf/` and of every URDF of the installed example-robot-data.
-
 Names are those of the files of `urdf/` and of every URDF of the installed example-robot-data.
 """
 

@@ -44,8 +44,8 @@ _USE = {
     STIFFNESS: 'rd.effects.Spring("urdf", rest=…)',
     REST: 'rd.effects.Spring(…, rest="urdf")',
     DAMPING: "rd.effects.ViscousFriction",
-    LOWER: 'joint_stops with lower="urdf_soft"',
-    UPPER: 'joint_stops with upper="urdf_soft"',
+    LOWER: 'arm.with_soft_limits(), or stops with lower="urdf_soft"',
+    UPPER: 'arm.with_soft_limits(), or stops with upper="urdf_soft"',
 }
 _UNITS = {
     ARMATURE: "kg m²",

@@ -45,6 +45,8 @@ from robot_dyn.effects.causes import Causes as Causes
 from robot_dyn.effects.causes import exerted_torques as exerted_torques
 from robot_dyn.effects.causes import torques_by_cause as torques_by_cause
 from robot_dyn.effects.effect import numbered as numbered
+from robot_dyn.effects.torque_speed import Points as Points
+from robot_dyn.effects.torque_speed import TorqueSpeed as TorqueSpeed
+from robot_dyn.effects.torque_speed import check_line as check_line
 from robot_dyn.effects.torque_speed_limit import AT as AT
-from robot_dyn.effects.torque_speed_limit import check_line as check_line
 from robot_dyn.effects.torque_speed_limit import check_speed as check_speed

@@ -18,6 +18,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.effects.effect import Bound, Effect
+from robot_dyn.effects.torque_speed import NO_LINE, TorqueSpeed, check_line
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import (
     ROWS,
@@ -34,7 +35,6 @@ from robot_dyn.queries.dynamics import Dynamics
 
 AT = "joint", "motor"
 _MAX_JOINT_SPEED = 100.0  # [rad/s] or [m/s]: higher speeds at the joint must be those of a motor
-_NO_LIMIT = np.zeros(1), np.full(1, inf)
 
 
 @final
@@ -103,11 +103,12 @@ class TorqueSpeedLimit(Bound):
         for name, (x, y) in self._lines():
             if np.isinf(y).all():
                 continue
-            check_line(f"{self.name}{name}", x, y, EffectError)
+            where = f"{self.name} of {name}" if name else self.name
+            check_line(where, x, y, EffectError)
             if y[-1] != 0:
-                raise EffectError(f"{self.name}{name}: torque must end with 0, at the no-load speed, got {y[-1]:g}")
+                raise EffectError(f"{where}: torque must end with 0, at the no-load speed, got {y[-1]:g}")
             if self.at == "joint":
-                check_speed(f"{self.name}{name}", float(x[-1]), EffectError)
+                check_speed(where, float(x[-1]), EffectError)
 
     @property
     def _stated(self) -> tuple[Any, Any]:
@@ -115,10 +116,10 @@ class TorqueSpeedLimit(Bound):
         return self.speed, self.torque
 
     def _lines(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
-        """Yield the polylines, with the part of a message that names the joint."""
+        """Yield the polylines, with the name of the joint, "" if it is not stated."""
         speed, torque = self._stated
         if isinstance(speed, Mapping):
-            yield from ((f" of {name}", (x, torque[name])) for name, x in speed.items())
+            yield from ((name, (x, torque[name])) for name, x in speed.items())
         elif np.shape(speed) != np.shape(torque):
             shapes = f"{np.shape(speed)} and {np.shape(torque)}"
             raise EffectError(f"{self.name}: speed and torque must have the same shape, got {shapes}")
@@ -129,30 +130,25 @@ class TorqueSpeedLimit(Bound):
         resolved: Any = super().on(dynamics)
         if self._peak is not None:
             return resolved
-        lines = [line for _, line in self._lines()]
-        if isinstance(stated := self._stated[0], Mapping):
-            by_name = dict(zip(stated, lines, strict=True))
-            lines = [by_name.get(name, _NO_LIMIT) for name in dynamics.joint_names]
-        lines *= dynamics.n if len(lines) == 1 else 1
-        if len(lines) != dynamics.n:
-            raise EffectError(f"{self.name}: speed has rows for {len(lines)} joints, but the arm has {dynamics.n}")
-        size = max(len(line[0]) for line in lines)
-        speed, torque = (
-            np.array([np.pad(line[k], (0, size - len(line[k])), "edge") for line in lines]) for k in (0, 1)
-        )
-        limited = np.isfinite(torque[:, 0])
+        rows = [(name, np.stack(line)) for name, line in self._lines()]
+        if isinstance(self._stated[0], Mapping):
+            rows = [(name, dict(rows).get(name, NO_LINE)) for name in dynamics.joint_names]
+        rows *= dynamics.n if len(rows) == 1 else 1
+        if len(rows) != dynamics.n:
+            raise EffectError(f"{self.name}: speed has rows for {len(rows)} joints, but the arm has {dynamics.n}")
+        lines = TorqueSpeed.padded([line for _, line in rows])
         ratio = np.broadcast_to(1.0 if resolved.gear_ratio is None else resolved.gear_ratio, dynamics.n)
-        peak, corners, slopes = _hinges(
-            speed / ratio[:, None], np.where(limited[:, None], torque * ratio[:, None], 1.0)
-        )
+        at_joint = TorqueSpeed(lines.speed / ratio[:, None], lines.torque * ratio[:, None])
+        slopes = np.diff(at_joint.slopes).T
         tables = {
-            "_peak": peak,
-            "_corners": corners,
+            "_peak": at_joint.finite[:, 0],
+            "_corners": at_joint.speed.T,
             "_slopes": np.array([slopes] * 2),
+            "_floors": np.zeros((2, *slopes.shape)),
+            "_limit": np.where(lines.exists, 1.0, inf),
             "_middle": np.zeros(dynamics.n),
         }
-        floors, limit = np.zeros((2, *slopes.shape)), np.where(limited, 1.0, inf)
-        return with_values(resolved, tables | {"_floors": floors, "_limit": limit, "speed": speed, "torque": torque})
+        return with_values(resolved, tables | {"speed": lines.speed, "torque": lines.torque})
 
     @property
     def _tables(self) -> tuple[Any, ...]:
@@ -220,19 +216,6 @@ def check_place(at: object, has_ratio: bool, error: type[RobotDynError]) -> None
         raise error(f"values at the {at} {'need a' if at == 'motor' else 'have no'} gear ratio: {more}")
 
 
-def check_line(name: str, speed: np.ndarray, torque: np.ndarray, error: type[RobotDynError]) -> None:
-    """Raise an error unless the speeds of a polyline increase, and its torques do not."""
-    if np.shape(speed) != np.shape(torque):
-        raise error(f"{name}: got {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
-    if not torque[0] > 0:
-        raise error(f"{name}: torque must begin with a positive value, got {torque[0]:g}")
-    step = np.diff(speed)
-    if ((step < 0) | ((step == 0) & (np.diff(torque) != 0))).any():
-        raise error(f"{name}: speed must increase from point to point, got {shown(np.asarray(speed).tolist())}")
-    if (np.diff(torque) > 0).any():
-        raise error(f"{name}: torque must not increase with speed, got {shown(np.asarray(torque).tolist())}")
-
-
 def check_speed(name: str, speed: float, error: type[RobotDynError]) -> None:
     """Raise an error for a speed of a motor that is stated at the joint."""
     if speed > _MAX_JOINT_SPEED:
@@ -240,10 +223,3 @@ def check_speed(name: str, speed: float, error: type[RobotDynError]) -> None:
             f"{name}: {speed:.4g} rad/s ({speed * 30 / np.pi:.4g} rpm) at the joint must be the speed of a motor before"
             " its gear; set at to motor and give the gear ratio, 1 without a gear"
         )
-
-
-def _hinges(speed: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return τ(0), (n,), the corners, and the change of slope at each, (k, n), of polylines (n, k)."""
-    step = np.diff(speed)
-    slope = np.divide(np.diff(torque), step, out=np.zeros_like(step), where=step > 0)
-    return torque[:, 0], speed.T, np.diff(np.pad(slope, ((0, 0), (1, 1)))).T

@@ -34,7 +34,6 @@ class StepControl(NamedTuple):
         h: The latest step, with its sign.
         end: End of the latest step.
         error: ‖e₋‖, limited from below.
-        rejected: Number of rejected steps.
         mesh_index: Index of the next time of the mesh.
         mesh: Times at which steps must end, (k,); error control may add others. (0,) for none.
         rtol, atol: Tolerances, both 0 if only the mesh determines the steps.
@@ -46,7 +45,6 @@ class StepControl(NamedTuple):
     h: Array
     end: Array
     error: Array
-    rejected: Array
     mesh_index: Array
     mesh: Array
     rtol: float
@@ -99,15 +97,13 @@ def initial_control(
 ) -> StepControl:
     """Return the state of step control before the first step; see `StepControl` for the arguments."""
     next_h, h, end, error = np.zeros((4, 1))
-    rejected, mesh_index = np.zeros((2, 1), np.int64)
     error[0] = 1e-4
     return StepControl(
         next_h=next_h,
         h=h,
         end=end,
         error=error,
-        rejected=rejected,
-        mesh_index=mesh_index,
+        mesh_index=np.zeros(1, np.int64),
         mesh=mesh,
         rtol=float(rtol),
         atol=float(atol),
@@ -164,7 +160,6 @@ def controls_error(control: StepControl) -> bool:
 
 def shortened(control: StepControl, h: float, e: float) -> float:
     """Return the length of the next trial after a step of length h is rejected with the error e."""
-    control.rejected[0] += 1
     return abs(h) * (max(_MIN, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
 
 

@@ -22,7 +22,7 @@ def gravity_lines(
 ) -> Iterator[str]:
     """Yield remarks on joints on which gravity exerts no torque at any position; on `balanced` ones in any mounting."""
     if len(free) == n:
-        yield f"{no_torque(gravity)} without effects"
+        yield f"{no_torque(gravity)} without effects{', in any mounting' if len(balanced) == n else ''}"
         return
     mounted = [name for name in free if name not in balanced]
     for names, when in ((mounted, "as the robot is mounted"), (balanced, "in any mounting")):

@@ -39,6 +39,7 @@ from robot_dyn.description.other_programs import (
     of_coordinates,
     statements,
 )
+from robot_dyn.description.soft_limits import within_soft_limits
 from robot_dyn.description.structure import Structure, structure_of
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import (
@@ -256,12 +257,12 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def soft_lower(self) -> ndarray:
-        """Lower soft limits of <safety_controller>, (n,) in [rad] or [m]; −inf if unstated."""
+        """Lower soft limits of <safety_controller>, (n,) in [rad] or [m]; −inf if unstated; see `with_soft_limits`."""
         return self._stated(LOWER, -np.inf)
 
     @cached_property
     def soft_upper(self) -> ndarray:
-        """Upper soft limits of <safety_controller>, (n,) in [rad] or [m]; inf if unstated."""
+        """Upper soft limits of <safety_controller>, (n,) in [rad] or [m]; inf if unstated; see `with_soft_limits`."""
         return self._stated(UPPER, np.inf)
 
     @cached_property
@@ -480,11 +481,22 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         robot = Robot(description, edits, self.answer_check or (None if from_file else gripper.answer_check))
         return robot.announced(known=self.findings) if from_file else robot
 
+    def with_soft_limits(self) -> Robot:
+        """Return a robot whose position limits are narrowed to the soft limits of its file, for example for a planner.
+
+        Continuous joints, which have no position limits, do not change. Effects that stop at `soft_lower` and
+        `soft_upper` do not need it.
+
+        Raises:
+            EditError: If the file states no soft limits, or those of a joint leave no position within its limits.
+        """
+        return Robot(within_soft_limits(self.description), self.edits, self.answer_check)
+
     def to_urdf(self, path: str | Path) -> Path:
         """Write the robot with its edits as a URDF; an existing file is replaced.
 
-        Locked joints become fixed joints, payloads become links. Mesh addresses are kept; relative ones are adapted to
-        the new folder.
+        Locked joints become fixed joints, payloads become links. Soft limits and mesh addresses are kept; relative
+        addresses are adapted to the new folder.
 
         Args:
             path: Path with suffix .urdf, which is added if missing; not the file that the robot was read from.

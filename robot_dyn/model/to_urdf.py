@@ -2,7 +2,7 @@
 
 Locked joints, and joints that follow them, are fixed at T · exp(ξ̂ q); payloads become separate links; edited masses
 and inertias replace the file's. Other literals are unchanged; rotations of locked joints are converted to roll, pitch
-and yaw. Shapes and materials are copied; other elements, for example transmissions, are left out.
+and yaw. Shapes, materials and soft limits are copied; other elements, for example transmissions, are left out.
 """
 
 from __future__ import annotations
@@ -113,12 +113,16 @@ def _restate(joint: Any) -> None:
 
 
 def _draw(out: Any, description: Description, folder: Path) -> None:
-    """Copy the shapes of links, and the materials, from the original text."""
+    """Copy the shapes of links, the materials and the soft limits from the original text."""
     read, _ = parse(description.text, description.source)
     shapes = {(link.get("name") or "").strip(): link for link in read.iterfind("link")}
     for link in out.iterfind("link"):
         if (drawn := shapes.get(link.get("name"))) is not None:
             link.extend(deepcopy(element) for element in drawn if element.tag in _DRAWN)
+    moving = {joint.get("name"): joint for joint in out.iterfind("joint") if joint.get("type") != "fixed"}
+    for joint in read.iterfind("joint[safety_controller]"):
+        if (written := moving.get((joint.get("name") or "").strip())) is not None:
+            written.append(deepcopy(joint.find("safety_controller")))
     for material in reversed(read.findall("material")):
         out.insert(0, deepcopy(material))
     source = Path(description.source)

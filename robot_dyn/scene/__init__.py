@@ -5,7 +5,7 @@ effects.py, control.py, references.py    the tables [[effect]], [control] and [r
 declared.py      tables whose keys are the coefficients of classes, or the arguments of user-defined functions
 schema.py        rules for every table: types of values, units, no unknown key
 messages.py      line numbers of keys and tables; errors of pydantic as messages: line, key, value
-explain.py       the equations of a scene, term by term; manual.py writes docs/reference/scenes.md
+explain.py       the equations of a scene, term by term
 starters/        scenes to start from
 """
 

@@ -73,6 +73,14 @@ def find_file(
             if remarks is not None and remark not in remarks:
                 remarks.append(remark)
             return file.resolve()
+    for folder, end in _elsewhere(parts, source, whole=kind == "package"):
+        with suppress(OSError, ValueError):
+            inside = folder.joinpath(*end[:-1])
+            if alike := [name for name in os.listdir(inside) if name.lower() == end[-1].lower()]:
+                raise MeshError(
+                    f"there is no such file on this computer, but {inside.name!r} has {shorten(alike[0])!r}; correct"
+                    " the capital letters of one of them"
+                )
     raise MeshError(f"there is no such file on this computer; put it in meshes/ next to the URDF, or {remedy}")
 
 

@@ -89,16 +89,16 @@ def data_set(
     row, coordinates, variables = columns[0].quantity, {"joint": list(joint_names)}, dict(more or {})
     for quantity, grouped in groupby(columns, lambda column: column.quantity):
         group = list(grouped)
-        of, name = tuple(column.component for column in group), re.sub(r"[\s/]", "_", quantity)
+        components, name = tuple(column.component for column in group), re.sub(r"[\s/]", "_", quantity)
         if name in variables:
             raise QueryError(f"two variables would be named {shorten(name)!r}; give effects other names")
         units = " or ".join(dict.fromkeys(column.unit for column in group if column.unit))
         about = {key: text for key, text in (("units", units), ("long_name", group[0].title)) if text}
-        if of == ("",):
+        if components == ("",):
             variables[name] = (row,), group[0].values, about
             continue
-        over = "joint" if of == joint_names else group[0].dimension or f"{name}_number"
-        coordinates.setdefault(over, list(of))
+        over = "joint" if components == joint_names else group[0].dimension or f"{name}_number"
+        coordinates.setdefault(over, list(components))
         variables[name] = (row, over), np.stack([column.values for column in group], axis=1), about
     coordinates |= {name: variables.pop(name) for name in (row, "t") if name in variables}
     return needs("xarray", extra=EXTRA).Dataset(variables, coordinates, dict(attributes))

@@ -19,11 +19,11 @@ from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, rotors_of, wrenches
+from robot_dyn.simulation.results.acting import acting, at_stop, wrenches
 from robot_dyn.simulation.results.causes import broken_away, effect_torques, plant_of
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger, leak
-from robot_dyn.simulation.results.provenance import bits_of_machine_code, edits_of_machine_code, origin, settings_text
+from robot_dyn.simulation.results.provenance import origin, settings_text
 from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
@@ -106,10 +106,8 @@ class Results:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """Texts: origin, settings, changes by machine code, and the texts of the setup."""
-        edits = edits_of_machine_code(self.setup) | bits_of_machine_code() if self.compiled else {}
-        texts = frame_of(self.setup) | rotors_of(self.setup) | settings_text(self.setup)
-        return texts | origin(self.setup.plant.dynamics) | edits | self.texts
+        """Texts: settings, origin, and the texts of the setup."""
+        return settings_text(self.setup) | origin(self.setup, self.compiled) | self.texts
 
     @property
     def wrenches(self) -> dict[str, np.ndarray]:

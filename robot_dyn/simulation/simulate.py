@@ -88,7 +88,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
     recording, error = _estimated(ran, runner)
     estimated = perf_counter()
     results = Results(
-        ran.setup, recording, ran.observer, error, dict(setup.metadata), ran.engine.exact_right_angles, ran.remarks
+        ran.setup, recording, ran.observer, error, dict(setup.metadata), ran.engine.is_compiled, ran.remarks
     )
     attributes: dict[str, Any] = {
         "joint_names": setup.plant.dynamics.joint_names,

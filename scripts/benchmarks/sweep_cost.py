@@ -29,7 +29,6 @@ import psutil
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.cluster import client_of
 from robot_dyn.tools.sweeps.folder import Folder, opened
 from robot_dyn.tools.sweeps.run_sweep import begun
 from robot_dyn.tools.sweeps.work import Work
@@ -122,10 +121,10 @@ def samples(given: argparse.Namespace) -> None:
         done = sw.run(
             replace(planar(folder, given.runs), samples=sw.samples("q", "v", "u")), f"{folder}/out", threads=2
         )
-        size = sum(path.stat().st_size for path in Path(folder, "out", "samples").rglob("*") if path.is_file())
+        size = sum(path.stat().st_size for path in Path(folder, "out", "rows").rglob("*") if path.is_file())
         ran, data = peak_rss(), done.samples()
-        last = data.q[:, -1, 1].values  # of all runs, which reads every shard
-        print(f"{given.runs} runs, {size / 2**30:.2f} GiB of samples in chunks of {done.folder.chunk}: peak RSS"
+        last = data.q[:, -1, 1].values  # of all runs
+        print(f"{given.runs} runs, {size / 2**30:.2f} GiB of rows and samples, chunks of {done.folder.chunk}: peak RSS"
               f" {ran:.0f} MiB; quantiles of q read back {np.quantile(last, (0.05, 0.5, 0.95))}, equal to the rows:"
               f" {(last == done.table('end')['end']).all()}; peak RSS {peak_rss():.0f} MiB", flush=True)  # fmt: skip
 
@@ -148,7 +147,7 @@ def overhead(given: argparse.Namespace) -> None:
             start, stop = known.run_range(chunk)
 
             def sweep(chunk: int = chunk, start: int = start, stop: int = stop) -> None:
-                known.write(chunk, work.rows(start, stop))
+                known.write(chunk, *work.run_rows(start, stop))
 
             values = plan.values(start, stop)
 
@@ -188,7 +187,13 @@ def cluster(given: argparse.Namespace) -> None:
     once, the setup and its kernels, is told apart.
     """
     many = panda if given.arm == "panda" else planar
-    with tempfile.TemporaryDirectory() as folder, client_of("local:2x1") as client:
+    import distributed
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local,
+        distributed.Client(local, set_as_default=False) as client,
+    ):
         chunk = begun(many(folder, 10**7), Path(folder) / "pilot").chunk
         workers = [psutil.Process(pid) for pid in client.run(os.getpid).values()]
 
@@ -238,7 +243,7 @@ def resume(given: argparse.Namespace) -> None:
         sweep = planar(folder, 640_000)
         known = begun(sweep, Path(folder) / "out", chunk=64)
         known.prepare()
-        known.write(0, Work(sweep).rows(0, 64))
+        known.write(0, *Work(sweep).run_rows(0, 64))
         for chunk in range(1, known.count - 1):
             os.link(known.file(0), known.file(chunk))
         # in a process of its own, whose kernels are in the store

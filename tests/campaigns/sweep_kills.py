@@ -22,6 +22,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import distributed
 import psutil
 
 from robot_dyn.foundations import files
@@ -34,10 +35,17 @@ CALLS = "open", "fsync", "replace"
 
 
 def fill(plan: sw.Sweep, out: str, calls: int, options: dict[str, Any]) -> None:
-    """A driver; after so many calls inside writes it ends itself, if that is not 0."""
+    """A driver, by two workers of Dask without options; it ends itself after `calls` calls inside writes, if any."""
     if calls:
         files.os = Counted(calls)
-    sw.run(plan, out, **options)
+    if options:
+        sw.run(plan, out, **options)
+        return
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local,
+        distributed.Client(local, set_as_default=False) as client,
+    ):
+        sw.run(plan, out, cluster=client)
 
 
 class Counted:
@@ -113,7 +121,7 @@ def drivers(plan: sw.Sweep, out: str, counts: dict[str, int], most: int) -> None
 
 def workers(plan: sw.Sweep, out: str, counts: dict[str, int], most: int) -> None:
     """A driver of two workers, of which one or both are killed; at last all processes at once, then a resumption."""
-    driver, before = start(plan, out, cluster="local:2x1"), counts["worker"]
+    driver, before = start(plan, out), counts["worker"]
     end = before + random.randint(1, 6)
     while driver.is_alive() and counts["worker"] < min(end, most):
         time.sleep(random.uniform(0.2, 3.0))

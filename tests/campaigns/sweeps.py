@@ -1,6 +1,6 @@
 """`python -m tests.campaigns.sweeps flips --count 400 --seed 1`: folders of sweeps; exit code 1 if a law is broken.
 
-- flips: A bit of a chunk, or of a shard of samples, is flipped: the answer is of the whole folder, or one error.
+- flips: A bit of a chunk is flipped: the answer is of the whole folder, or one error.
 - repeats: A run by itself, `result.run(i)`, has the bits of its row.
 """
 
@@ -49,11 +49,11 @@ def flips(file: Path, read: Read, count: int, rng: np.random.Generator) -> Itera
         if now.keys() != whole.keys() or any(now[name].tobytes() != x.tobytes() for name, x in whole.items()):
             yield f"SILENT {file.name}, byte {at}, bit {bit}"
     file.write_bytes(data)
-    print(f"{file.suffix or 'shard'}: {count} flips, {refused} refused", flush=True)
+    print(f"{file.name}: {count} flips, {refused} refused", flush=True)
 
 
 def flipped(count: int, seed: int, folder: Path) -> Iterator[str]:
-    """Flips of a chunk and of a shard."""
+    """Flips of a chunk: of its rows, and of its samples."""
     rng = np.random.default_rng([seed, 1])
     done = sw.run(swept(folder, 64, samples="q"), folder / "out", chunk=32)
 
@@ -66,9 +66,8 @@ def flipped(count: int, seed: int, folder: Path) -> Iterator[str]:
         kept = sw.read_sweep(done.path).samples()
         return {name: kept[name].values for name in kept.variables}
 
-    yield from flips(min((done.path / "rows").glob("*.parquet")), table, count, rng)
-    shards = [path for path in (done.path / "samples" / "q" / "c").rglob("*") if path.is_file()]
-    yield from flips(max(shards, key=lambda path: path.stat().st_size), samples, count, rng)
+    for read in (table, samples):
+        yield from flips(min((done.path / "rows").glob("*.parquet")), read, count, rng)
 
 
 def repeated(count: int, seed: int, folder: Path) -> Iterator[str]:

@@ -133,11 +133,47 @@ def test_soft_limits_are_those_of_the_safety_controller() -> None:
     assert run.q[-1, 1] == pytest.approx(0.5, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("soft", "lower", "upper"),
+    [
+        ('soft_lower_limit="-0.3" soft_upper_limit="0.2"', -0.3, 0.2),
+        ('soft_lower_limit="-4" soft_upper_limit="0.2"', -3.0, 0.2),  # the hard limit is narrower
+        ('soft_upper_limit="0.2"', -3.0, 0.2),
+    ],
+)
+def test_soft_limits_narrow_the_position_limits_on_request(
+    soft: str, lower: float, upper: float, tmp_path: Path
+) -> None:
+    """For planners: both intervals hold. `to_urdf` keeps the element, so a reader may ask again."""
+    arm = robot(j=f'<safety_controller k_velocity="9" {soft}/>')
+    narrow = arm.with_(mass_scale=1.1).with_soft_limits()
+    assert (narrow.lower[0], narrow.upper[0]) == (lower, upper) and narrow.lower[1] == arm.lower[1]
+    assert narrow.edits.mass_scale == 1.1 and narrow.with_soft_limits().upper[0] == upper
+    for name, written in (("arm", arm), ("narrow", narrow)):
+        again = rd.load(written.to_urdf(tmp_path / name))
+        assert np.array_equal(again.upper, written.upper) and np.array_equal(again.soft_upper, arm.soft_upper)
+    assert "safety_controller" not in arm.with_(lock={"j": 0.1}).to_urdf(tmp_path / "locked").read_text()
+
+
+@pytest.mark.parametrize(
+    "soft",
+    [
+        'soft_lower_limit="0.3" soft_upper_limit="-0.2"', 'soft_lower_limit="4"', 'soft_upper_limit="-4"',
+        'soft_lower_limit="x"',
+    ],
+)  # fmt: skip
+def test_soft_limits_without_a_position_are_refused(soft: str) -> None:
+    with pytest.raises(rd.RobotDynError, match="'j'"):
+        robot(j=f'<safety_controller k_velocity="9" {soft}/>').with_soft_limits()
+
+
 def test_what_a_file_does_not_state_is_refused() -> None:
     arm = robot()
     assert arm.statements == ()
     with pytest.raises(rd.RobotDynError):
         arm.with_(armature="urdf")
+    with pytest.raises(rd.RobotDynError):
+        arm.with_soft_limits()
     for effect in (rd.effects.Spring("urdf"), rd.effects.RigidStops("urdf_soft", "urdf_soft")):
         with pytest.raises(rd.RobotDynError):
             rd.Plant(arm, [effect])

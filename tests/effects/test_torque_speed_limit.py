@@ -155,7 +155,7 @@ torque_N_m = {joint_1 = [3.0, 0.0], joint_2 = [2.0, 0.0]}
         ({"speed": [0.0, 4.0], "torque": [6.0, 0.0], "gear_ratio": 9.0}, "set at to motor, or remove gear_ratio"),
         ({"speed": [0.0, 4.0], "torque": [6.0, 0.0], "at": "shaft"}, "must be joint or motor"),
         ({"speed": {"joint_1": [0.0, 4.0]}, "torque": [6.0, 0.0]}, "by joint name or both be arrays"),
-        ({"speed": {"joint_1": [0.0, 4.0]}, "torque": {"joint_2": [6.0, 0.0]}}, "name different joints"),
+        ({"speed": {"joint_1": [0.0, 4.0]}, "torque": {"joint_2": [6.0, 0.0]}}, "have different joints"),
         ({"speed": {"elbow": [0.0, 4.0]}, "torque": {"elbow": [6.0, 0.0]}}, "no joint 'elbow'"),
         ({"speed": [[0.0, 4.0]] * 3, "torque": [[6.0, 0.0]] * 3}, "has rows for 3 joints"),
     ],

@@ -38,7 +38,7 @@ def equation_of(made: rd.Setup) -> StateEquation:
 
 def exact_jacobian(made: rd.Setup, t: float, y: np.ndarray) -> np.ndarray:
     """∂f/∂y_j for each j, then ∂f/∂t, of machine code."""
-    machine = machine_code(equation_of(made), jacobian=True)
+    machine = machine_code(equation_of(made), rd.integrate.method("Rodas5PFixed"))
     out, m = np.empty((len(y) + 1, len(y), 1)), len(y)
     p, run_parameters = segment_table(made).parameters[0], machine.run_parameters({})
     machine.in_python.jacobian(t, np.ascontiguousarray(y)[:, None], p, run_parameters, out)
@@ -85,7 +85,7 @@ def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
 
 
 def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = machine_code(equation_of(setup()), jacobian=True)
+    made = machine_code(equation_of(setup()), rd.integrate.method("Rodas5PFixed"))
     wrong = replace(made, code=replace(made.code, checked={}))
     functions = made.in_python
 
@@ -102,7 +102,7 @@ def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
     assert "jacobian" not in machine_code(equation, rd.integrate.method("RK4")).code.programs
     assert machine_code(equation).in_python.jacobian == 0
-    assert "jacobian" in machine_code(equation, jacobian=True).code.programs
+    assert "jacobian" in machine_code(equation, rd.integrate.method("Rodas5PFixed")).code.programs
 
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
@@ -112,7 +112,11 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
     machine = machine_code(
-        equation_of(made), lanes=lanes, extras=(), swept=("viscous_friction.viscous",), jacobian=True
+        equation_of(made),
+        rd.integrate.method("Rodas5PFixed"),
+        lanes=lanes,
+        extras=(),
+        swept=("viscous_friction.viscous",),
     )
     m = machine.equation.size
     y, out = rng.normal(size=(m, lanes)), np.empty((m + 1, m, lanes))

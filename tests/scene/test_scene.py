@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scene_reference
 
 import robot_dyn as rd
 from robot_dyn.foundations import SceneError
@@ -24,7 +25,6 @@ from robot_dyn.scene import (
     starter,
     starter_names,
 )
-from robot_dyn.scene.manual import manual
 from tests.command import run
 from tests.effect_examples import arguments
 from tests.long import long
@@ -236,8 +236,8 @@ PARTS = [
 
 
 def test_the_page_is_that_of_the_schema() -> None:
-    command = "python -m robot_dyn.scene.manual > docs/reference/scenes.md"
-    assert PAGE.read_text(encoding="utf-8") == manual(), f"the page is out of date; write it by {command}"
+    command = "python scripts/scene_reference.py > docs/reference/scenes.md"
+    assert PAGE.read_text(encoding="utf-8") == scene_reference.page(), f"the page is out of date; write it by {command}"
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda each: each.__name__)

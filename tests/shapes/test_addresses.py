@@ -50,6 +50,12 @@ def test_a_path_of_another_computer_is_read_near_the_urdf_and_reported(address: 
     assert (here.notes, len(here.pieces), here.remarks) == ((), 2, tuple(remarks))
 
 
+@pytest.mark.parametrize("address", ["package://lost/meshes/ARM.STL", "/home/user/meshes/Arm.stl"])
+def test_a_file_whose_name_differs_in_capital_letters_is_named(address: str, tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match=r"'arm\.stl'"):
+        find_file(address, near(tmp_path, NEAR), ())
+
+
 @pytest.mark.parametrize(
     ("address", "file"),
     [

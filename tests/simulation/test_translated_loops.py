@@ -64,7 +64,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
     runs = [Run(setup, each) for each in (code, replace(code, machine_loop=None))]
     for each in runs:
         room = (
-            each.state.lanes._replace(y=0, p=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0),
+            each.state.lanes._replace(y=0, p=0, run_parameters=0, scale=0, energy=0, keys=0),
             each.steps.stepper.work,
         )
         for _, x in numbers(room):  # what is not written yet
@@ -197,11 +197,9 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
         ):
             x[...] = 0
         rows = samples_at_most(made, plan.counts)
-        records = records_of(
-            np.arange(m), np.zeros((rows, m, W)), np.zeros((rows, n + 2, W)), np.empty((0, m)), np.empty((0, m)),
-            np.empty((1 + 3 * n, 0)),
-            observation_of(np.vstack([starts[: 2 * n], np.full((n, W), np.nan)]), of_levels),
-        )  # fmt: skip
+        observation = observation_of(np.vstack([starts[: 2 * n], np.full((n, W), np.nan)]), of_levels)
+        arrays = np.arange(m), np.zeros((rows, m, W)), np.zeros((rows, n + 2, W))
+        records = records_of((m, n), *arrays, observation=observation)
         records.t[...] = 0
         loop = Loop(plan, lanes, records, config, start_position())
         loop.position.budget[0] = 10**6

@@ -31,7 +31,7 @@ _LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and its powers do not ove
 _FEW, _PART = 3, 0.1  # smallest number, and fraction of the samples, whose times go back in two interleaved series
 TWO_PUBLISHERS = "keep the samples of one, or record its topic alone"
 _STEPS = 1e-12, 1e15  # [s]: fifth powers of such steps neither vanish nor overflow
-_NAME_JOINTS = "joints={joint: column}, --joint JOINT=COLUMN on the command line"
+_NAME_JOINTS = "joints={joint: column} (--joint JOINT=COLUMN)"
 
 
 @final
@@ -101,7 +101,11 @@ def recorded(
     note = "; ".join([table.note] * bool(table.note) + [f"without the text columns {shown(skipped)}"] * bool(skipped))
     absent = [name for name in arm.joint_names if name not in at]
     if absent and (q0 is None or not at):
-        names, rest = ("any joint", "") if q0 is not None else (", ".join(absent), ", or give its rest position in q0")
+        names, rest = (
+            ("any joint", "")
+            if q0 is not None
+            else (", ".join(absent), ", or give its rest position in q0 (--lock JOINT=VALUE)")
+        )
         raise PlanError(f"there is no column of {names}; {nearest(absent[0], heads)}; name it by {_NAME_JOINTS}{rest}")
     rests = np.zeros(arm.n) if q0 is None else _rests(arm, q0)
     q, stated = np.tile(rests, (len(t), 1)), np.ones(arm.n, bool)
@@ -146,7 +150,7 @@ def _times(
         heads = {other: x for other, x in heads.items() if other != head}
     elif isinstance(time, int | float):
         with np.errstate(over="ignore"):  # refused below
-            t = number("time", time, error=PlanError, above=0) * np.arange(m)
+            t = number("time between samples", time, error=PlanError, above=0) * np.arange(m)
     else:
         t = numbers("time", time, (m,), error=PlanError)
     with np.errstate(over="ignore", invalid="ignore"):

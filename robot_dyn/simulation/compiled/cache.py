@@ -74,7 +74,6 @@ def machine_code(
     lanes: int = 1,
     extras: tuple[str, ...] | None = None,
     swept: tuple[str, ...] = (),
-    jacobian: bool = False,
     cuts: bool = False,
     detects: bool = False,
 ) -> MachineCode:
@@ -86,14 +85,13 @@ def machine_code(
         lanes: Number of runs in lock step.
         extras: See `trace`.
         swept: Names of the parameters that differ from run to run.
-        jacobian: True for the Jacobian of the rate, even if the method does not need it.
         cuts: True if the method chooses its steps, or if steps end at events.
         detects: True if steps in lock step detect which runs may pass a threshold.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; the message names it and a remedy.
     """
-    identified = identify(equation, method, extras, swept, jacobian)
+    identified = identify(equation, method, extras, swept)
     return _with_loop(identified, _functions_of(identified, lanes, swept), method, lanes, cuts, detects, swept)
 
 
@@ -157,23 +155,22 @@ def with_numbers(code: MachineCode, equation: StateEquation) -> MachineCode:
     return replace(code, equation=equation, compiled_form=compiled_form, inputs=inputs)
 
 
-def machine_code_of_constants(equation: StateEquation, method: Method, *, lanes: int = 1) -> MachineCode:
+def machine_code_of_constants(equation: StateEquation, method: Method) -> MachineCode:
     """Return a state equation as machine code without parameters: all its numbers are constants.
 
     Args:
         equation: The equation to compile.
         method: Method with plain steps.
-        lanes: Number of runs in lock step. With several runs, samples are empty: no u, v or energy.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; the message names it and a remedy.
     """
-    options = _traces(method, None if lanes == 1 else ())
+    options = _traces(method, None)
     compiled_form = _compiled_form(equation, options.nonsmooth)
     programs = _traced(compiled_form, (), options, constants=True)
-    functions = CompiledFunctions(programs, lanes, compiled_form.plant.dynamics.name)  # pyright: ignore
+    functions = CompiledFunctions(programs, 1, compiled_form.plant.dynamics.name)  # pyright: ignore
     identified = Identified(equation, compiled_form, (), ((), (), options), (), False)
-    return _with_loop(identified, functions, method, lanes)
+    return _with_loop(identified, functions, method)
 
 
 def _shared(
@@ -193,15 +190,14 @@ def _shared(
 
 
 def identify(
-    equation: StateEquation, method: Method | None, extras: tuple[str, ...] | None = None, swept: tuple[str, ...] = (),
-    jacobian: bool = False,
-) -> Identified:  # fmt: skip
+    equation: StateEquation, method: Method | None, extras: tuple[str, ...] | None = None, swept: tuple[str, ...] = ()
+) -> Identified:
     """Return a state equation with its structure; see `machine_code` for the arguments.
 
     Raises:
         TraceError: If the dynamics of the arm cannot be compiled.
     """
-    options = _traces(method, extras, jacobian)
+    options = _traces(method, extras)
     compiled_form = _compiled_form(equation, options.nonsmooth)
     inputs = _parameters(compiled_form, swept)
     described, objects, lasting = structure(compiled_form)
@@ -209,10 +205,8 @@ def identify(
     return Identified(equation, compiled_form, inputs, (described, places, options), objects, lasting)
 
 
-def _traces(method: Method | None, extras: tuple[str, ...] | None, jacobian: bool = False) -> Traces:
-    if method is None:
-        return Traces(extras, jacobian, False)
-    return Traces(extras, jacobian or method.needs_jacobian, method.nonsmooth)
+def _traces(method: Method | None, extras: tuple[str, ...] | None) -> Traces:
+    return Traces(extras, False, False) if method is None else Traces(extras, method.needs_jacobian, method.nonsmooth)
 
 
 def _compiled_form(equation: StateEquation, nonsmooth: bool) -> StateEquation:

@@ -117,9 +117,7 @@ class MachineCode:
     machine_loop: MachineFunction | None
     swept: tuple[str, ...] = ()
     refused: str = ""
-    exact_right_angles: ClassVar[bool] = True
-    doubtful: ClassVar[float] = 1e6  # machine code does not detect a singular M
-    most_threads: ClassVar[float] = inf
+    is_compiled: ClassVar[bool] = True
     most_evaluations: float = field(default=inf, init=False)
 
     @property
@@ -137,10 +135,9 @@ class MachineCode:
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
         """Return the functions with the numbers of an equation; see `Engine`."""
-        in_python = self.in_python
-        functions = in_python if self.machine_loop is None else self.code.addresses
+        functions = self.in_python if self.machine_loop is None else self.code.addresses
         numbers = self.parameters if equation is self.equation else self._numbers(equation)
-        return Evaluated(functions, in_python, numbers, True)
+        return Evaluated(functions, self.in_python, numbers)
 
     def _numbers(self, equation: StateEquation) -> np.ndarray:
         """Return the values of the parameters in an equation with other numbers, cached for the latest machine code."""

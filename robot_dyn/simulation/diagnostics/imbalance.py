@@ -39,10 +39,10 @@ def cause(setup: Setup, run: Recording) -> Doubt:
         return unbooked
     if setup.method.controls_error:
         return finer(setup, Doubt(DoubtKind.LOOSE_TOLERANCE))
-    missed = stepped_over(setup, run.step_log, 0.0) or cut_alike(setup, run)
-    if missed is None:
-        return finer(setup, Doubt(DoubtKind.LONG_STEPS))
-    return finer(setup, Doubt(missed.doubt.kind, missed.doubt.facts | {"at": missed.t}))
+    for onset in (stepped_over(setup, run.step_log, 0.0), cut_alike(setup, run)):
+        if onset.doubt is not None:
+            return finer(setup, Doubt(onset.doubt.kind, onset.doubt.facts | {"at": onset.t}))
+    return finer(setup, Doubt(DoubtKind.LONG_STEPS))
 
 
 def finer(setup: Setup, doubt: Doubt) -> Doubt:

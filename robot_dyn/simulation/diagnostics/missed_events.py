@@ -6,8 +6,6 @@ position between them. Parts that do not declare where they switch: their torque
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from robot_dyn.control.controller import Controller
@@ -16,7 +14,7 @@ from robot_dyn.foundations.errors import RobotDynError, call
 from robot_dyn.simulation.diagnostics.smoothness import LOOKS, cubics, extremes
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
+from robot_dyn.simulation.results.doubts import Doubt, DoubtKind, Onset, first_onset
 from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup.setup import Setup
@@ -24,15 +22,8 @@ from robot_dyn.simulation.setup.setup import Setup
 _STANDS_OUT = 50.0  # times the change of the torque from step to step
 
 
-class Missed(NamedTuple):
-    """A torque that acted between two steps: start of the step in [s], and the doubt that it causes."""
-
-    t: float
-    doubt: Doubt
-
-
-def stepped_over(setup: Setup, path: Path, error: float) -> Missed | None:
-    """Return the first torque that acted between two steps and would move a joint by more than the estimated error.
+def stepped_over(setup: Setup, path: Path, error: float) -> Onset:
+    """Return the start of the first step within which a torque acted and would move a joint by more than the error.
 
     Args:
         setup: The setup of the run.
@@ -40,16 +31,16 @@ def stepped_over(setup: Setup, path: Path, error: float) -> Missed | None:
         error: Estimated error of q, in [rad] or [m].
     """
     if len(path.t) < 2:
-        return None
+        return Onset()
     equation = setup.equation
-    q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
+    q, v = equation.motion(path.y)
     effects = () if setup.finds_events else setup.plant.effects
     missed = [_crossed(equation, effect, path, q, v, error) for effect in effects]
     missed += [_acts_between(equation, part, path, q, v, error) for part, _ in setup.undeclared]
-    return _first([one for one in missed if one is not None])
+    return first_onset(missed)
 
 
-def cut_alike(setup: Setup, run: Recording) -> Missed | None:
+def cut_alike(setup: Setup, run: Recording) -> Onset:
     """Return the first time from which a run of fixed steps and its companions take the same few steps between events.
 
     From there, a joint switches and switches back within a few steps, or switches in the last step of the run.
@@ -59,24 +50,18 @@ def cut_alike(setup: Setup, run: Recording) -> Missed | None:
     for event in run.events:
         if event.joint and event.t - latest.get(event.joint, -np.inf) < LEAST_STEPS * h:
             doubt = Doubt(DoubtKind.SWITCHES_TWICE, {"joint": event.joint, "steps": LEAST_STEPS})
-            missed.append(Missed(latest[event.joint], doubt))
+            missed.append(Onset(latest[event.joint], doubt))
         latest[event.joint] = event.t
     for joint, t in latest.items():
         if joint and end - h < t < end:
-            missed.append(Missed(t, Doubt(DoubtKind.SWITCHES_LAST, {"joint": joint})))
-    return _first(missed)
+            missed.append(Onset(t, Doubt(DoubtKind.SWITCHES_LAST, {"joint": joint})))
+    return first_onset(missed)
 
 
-def _first(missed: list[Missed]) -> Missed | None:
-    return min(missed, key=lambda one: one.t, default=None)
-
-
-def _crossed(
-    equation: StateEquation, effect: Effect, path: Path, q: np.ndarray, v: np.ndarray, error: float
-) -> Missed | None:
-    """Return the first threshold of a position that a joint passed in both directions within a step."""
+def _crossed(equation: StateEquation, effect: Effect, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Onset:
+    """Return the first step within which a joint passed a threshold of its position in both directions."""
     if not isinstance(effect, Force):
-        return None
+        return Onset()
     low, high = extremes(path.t, q, v)
     missed = []
     for threshold in effect.thresholds(q.shape[1]):
@@ -95,17 +80,17 @@ def _crossed(
                     "depth": float(abs(far[k] - level)),
                     "step_s": float(path.t[k + 1] - path.t[k]),
                 }
-                missed.append(Missed(float(path.t[k]), Doubt(DoubtKind.CROSSED_WITHIN_STEP, facts)))
+                missed.append(Onset(float(path.t[k]), Doubt(DoubtKind.CROSSED_WITHIN_STEP, facts)))
                 break
-    return _first(missed)
+    return first_onset(missed)
 
 
 def _change(
     equation: StateEquation, effect: Force, path: Path, q: np.ndarray, v: np.ndarray, k: int, joint: int, far: float
 ) -> np.ndarray:
     """Return the change of the torque of an effect from the start of step k to where a joint turns, (n,)."""
-    n, states = len(q), _states_of(equation, effect)
-    z = () if states is None else (path.y[k, 2 * n : 2 * n + equation.states][states],)
+    n, place = len(q), equation.place_of(effect)
+    z = () if place is None else (path.y[k, place],)
     turned, stopped = q.copy(), v.copy()
     turned[joint], stopped[joint] = far, 0.0
     there, here = (call(effect.torque, equation.plant.dynamics, float(path.t[k]), x, stopped, *z) for x in (turned, q))
@@ -114,21 +99,19 @@ def _change(
 
 def _acts_between(
     equation: StateEquation, part: object, path: Path, q: np.ndarray, v: np.ndarray, error: float
-) -> Missed | None:
+) -> Onset:
     """Return the first step within which the torque of a part differs clearly from its values at both ends."""
-    n, m, dynamics = equation.plant.dynamics.n, equation.states, equation.plant.dynamics
-    states = slice(0, equation.state_size) if isinstance(part, Controller) else _states_of(equation, part)
+    n, place = equation.plant.dynamics.n, equation.place_of(part)
     if not isinstance(part, Force | Controller) or (isinstance(part, Controller) and equation.sampled):
-        return None
+        return Onset()
 
     def torque(t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> np.ndarray:
-        if isinstance(part, Controller):
-            return np.asarray(call(part.torque, t, q, v, z[states]), dtype=float)
-        state = (t, q, v) if states is None else (t, q, v, z[states])
-        return np.broadcast_to(np.asarray(call(part.torque, dynamics, *state), dtype=float), (n,))
+        state = (t, q, v) if place is None else (t, q, v, z)
+        first = () if isinstance(part, Controller) else (equation.plant.dynamics,)
+        return np.broadcast_to(np.asarray(call(part.torque, *first, *state), dtype=float), (n,))
 
     every = max(1, len(path.t) // LOOKS)
-    t, q, v, z = path.t[::every], q[::every], v[::every], path.y[::every, 2 * n : 2 * n + m]
+    t, q, v, z = path.t[::every], q[::every], v[::every], path.y[::every, place or slice(0)]
     count = max(1, LOOKS // len(t))  # points in each step, at fractions that differ from step to step
     s = (np.arange(count)[:, None] + np.random.default_rng(0).uniform(size=len(t) - 1)) / count
     try:
@@ -140,13 +123,13 @@ def _acts_between(
             there = np.array([torque(float(at[0]), *state) for at, *state in zip(*inside, strict=True)])
             jump = np.maximum(jump, np.abs(there - ends[:-1] - weight * np.diff(ends, axis=0)))
     except RobotDynError:
-        return None  # the run itself reports this error
+        return Onset()  # the run itself reports this error
     around = np.abs(np.diff(ends, axis=0))
     for k in np.flatnonzero((jump > _STANDS_OUT * around + 1e-9).any(axis=1)).tolist():
         if _displacement(equation, path, path.y[:, :n], k * every, jump[k]) > error:
             start = float(t[k])
-            return Missed(start, Doubt(DoubtKind.ACTS_BETWEEN_STEPS, {"part": named(part), "start": start}))
-    return None
+            return Onset(start, Doubt(DoubtKind.ACTS_BETWEEN_STEPS, {"part": named(part), "start": start}))
+    return Onset()
 
 
 def _between(t: np.ndarray, q: np.ndarray, v: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -157,14 +140,6 @@ def _between(t: np.ndarray, q: np.ndarray, v: np.ndarray, s: np.ndarray) -> tupl
     (a, b, c), h = cubics(t, q, v), np.diff(t)[:, None]
     rate = np.divide(s * (2 * b + 3 * s * a), h, out=np.zeros_like(a), where=h > 0)
     return q[:-1] + s * (c + s * (b + s * a)), v[:-1] + rate
-
-
-def _states_of(equation: StateEquation, part: object) -> slice | None:
-    """Return the place of the states of an effect after q and v; None if it has none."""
-    for k, place in equation.equation_of_motion.states.items():
-        if equation.plant.effects[k] is part:
-            return slice(equation.state_size + place.start, equation.state_size + place.stop)
-    return None
 
 
 def _displacement(equation: StateEquation, path: Path, q: np.ndarray, k: int, torque: np.ndarray) -> float:

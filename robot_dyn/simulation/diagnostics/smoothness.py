@@ -8,14 +8,14 @@ a kink on steps that cross much of it. [Hairer, Nørsett, Wanner 1993, II.6]
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.effects.effect import Bound
 from robot_dyn.simulation.dynamics.declarations import named
-from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
+from robot_dyn.simulation.results.doubts import Doubt, DoubtKind, Onset, first_onset
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -30,20 +30,13 @@ LOOKS = 4000  # evaluations, between steps, of parts that do not declare where t
 _STATES = 300  # states at which the actuation is computed
 
 
-class Kink(NamedTuple):
-    """Time from which the right-hand side may not be smooth, in [s], and the doubt; inf and None if it is smooth."""
-
-    t: float = np.inf
-    doubt: Doubt | None = None
-
-
 def rounds(part: object) -> bool:
     """Return True for a block of a loop whose output jumps."""
     return isinstance(part, Block) and part.rounds
 
 
-def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
-    """Return the first kink of the right-hand side along a run.
+def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Onset:
+    """Return the first kink of the right-hand side along a run, from which it may not be smooth.
 
     Args:
         setup: The setup of the run.
@@ -53,44 +46,42 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
     if setup.undeclared:
         part, lacks = setup.undeclared[0]
         facts: dict[str, float | str] = {"part": named(part), "lacks": lacks, "shortest_s": setup.duration_s / LOOKS}
-        return Kink(0.0, Doubt(DoubtKind.UNDECLARED, facts))
+        return Onset(0.0, Doubt(DoubtKind.UNDECLARED, facts))
     if setup.controller is not None and any(rounds(block.part) for block in setup.controller.parts):
-        return Kink(0.0, Doubt(DoubtKind.ROUNDED_AT_TICKS))
+        return Onset(0.0, Doubt(DoubtKind.ROUNDED_AT_TICKS))
     if len(path.t) < 2:
-        return Kink()
-    q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
-    kinks = [Kink()]
+        return Onset()
+    kinks: list[Onset] = []
     if not setup.method.controls_error:
-        kinks += _passed(setup, equation, path, q, v)
+        kinks += _passed(setup, equation, path)
         kinks.append(first_crossing(equation, path, parts=_THIRDS))
     if not setup.finds_events:
-        kinks.append(_saturation(setup, equation, path, q, v))
-    return min(kinks, key=_time)
+        kinks.append(_saturation(setup, equation, path))
+    return first_onset(kinks)
 
 
-def _passed(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> Iterator[Kink]:
+def _passed(setup: Setup, equation: StateEquation, path: Path) -> Iterator[Onset]:
     """Yield the first passage of each threshold at which no step ends."""
-    n, states = equation.plant.dynamics.n, equation.equation_of_motion.states
-    low, high = extremes(path.t, q, v)
+    n, y = equation.plant.dynamics.n, equation.with_velocities(path.y)
+    low, high = extremes(path.t, *equation.motion(path.y))
     for k, effect in enumerate(setup.plant.effects):
         for threshold in effect.thresholds(n):
-            joint, level, of_velocity = threshold.joint, threshold.level, threshold.of_velocity
+            joint, of_velocity = threshold.joint, threshold.of_velocity
             if threshold.of_actuation or (setup.finds_events and not (of_velocity and setup.method.canonical)):
                 continue
             if of_velocity or threshold.state is not None:
-                z = path.y[:, 2 * n + equation.state_size :]
-                x = v[:, joint] if threshold.state is None else z[:, states[k].start + threshold.state]
+                x = y[:, equation.row(k, threshold)]
                 below, above = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
             else:
                 below, above = low[:, joint], high[:, joint]
             facts: dict[str, float | str] = {
                 "joint": equation.plant.dynamics.joint_names[joint], "threshold": threshold.name
             }  # fmt: skip
-            passes = (below <= level) & (above >= level)
+            passes = (below <= threshold.level) & (above >= threshold.level)
             yield _first(path.t, passes, Doubt(DoubtKind.PASSES_WITHIN_STEP, facts))
 
 
-def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0, parts: int = 1) -> Kink:
+def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0, parts: int = 1) -> Onset:
     """Return the first kink that is a layer of an effect: steps cross it too fast.
 
     Args:
@@ -99,17 +90,11 @@ def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0, parts
         pace: Length of its steps, in steps of the run.
         parts: The number of equal parts into which each step is divided.
     """
-    n, states = equation.plant.dynamics.n, equation.equation_of_motion.states
-    q, v = path.y[:, :n], equation.velocities(path.y)
-    z = path.y[:, 2 * n + equation.state_size :]
+    y, kinks = equation.with_velocities(path.y), []
     steps = np.maximum(1.0, np.diff(path.key) / pace) if (path.key >= 0).all() else 1.0
-    kinks = [Kink()]
     for k, effect in enumerate(equation.plant.effects):
-        for layer in effect.layers(n):
-            if layer.state is not None:
-                x = z[:, states[k].start + layer.state]
-            else:
-                x = (v if layer.of_velocity else q)[:, layer.joint]
+        for layer in effect.layers(equation.plant.dynamics.n):
+            x = y[:, equation.row(k, layer)]
             crosses = np.abs(np.diff(x)) > _MOST_CROSSED * layer.width * steps * parts
             if layer.level is not None:
                 off = x - layer.level
@@ -119,7 +104,7 @@ def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0, parts
                 "joint": equation.plant.dynamics.joint_names[layer.joint], "effect": effect.name
             }  # fmt: skip
             kinks.append(_first(path.t, crosses, Doubt(DoubtKind.LAYER_CROSSED, facts)))
-    return min(kinks, key=_time)
+    return first_onset(kinks)
 
 
 def cubics(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -151,27 +136,24 @@ def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, n
     return low, high
 
 
-def _saturation(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> Kink:
+def _saturation(setup: Setup, equation: StateEquation, path: Path) -> Onset:
     """Return the first kink that is a continuous control near a level of the actuation."""
     n, m = equation.plant.dynamics.n, equation.state_size
     if setup.controller is None or equation.sampled:
-        return Kink()
+        return Onset()
     parts = [(setup.controller.thresholds(), lambda u, v: u)]
     parts += [(effect.thresholds(n), effect.limited) for effect in setup.plant.effects if isinstance(effect, Bound)]
-    levels = [(x.joint, abs(x.level), values) for of, values in parts for x in of if x.of_actuation]
+    levels = [(x.joint, abs(x.level), values) for declared, values in parts for x in declared if x.of_actuation]
     if not levels:
-        return Kink()
+        return Onset()
+    q, v = equation.motion(path.y)
     rows = np.unique(np.linspace(0, len(path.t) - 1, _STATES).astype(int))
     u = np.array([equation.command(float(path.t[i]), q[i], v[i], path.y[i, 2 * n : 2 * n + m]) for i in rows])
     near = [np.abs(values(u, v[rows])[1:, i]) > _NEAR_LIMIT * level for i, level, values in levels]
     return _first(path.t[rows], np.any(near, axis=0), Doubt(DoubtKind.SATURATES))
 
 
-def _first(t: np.ndarray, happens: np.ndarray, doubt: Doubt) -> Kink:
-    """Return the kink at the start of the first interval on which something happens."""
+def _first(t: np.ndarray, happens: np.ndarray, doubt: Doubt) -> Onset:
+    """Return the onset of a doubt at the start of the first interval on which something happens."""
     rows = np.flatnonzero(happens)
-    return Kink(float(t[rows[0]]), doubt) if len(rows) else Kink()
-
-
-def _time(kink: Kink) -> float:
-    return kink.t
+    return Onset(float(t[rows[0]]), doubt) if len(rows) else Onset()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -14,17 +14,15 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.effects.torque_speed_limit import TorqueSpeedLimit
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.differences import by_state, rowwise
-from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit
-from robot_dyn.simulation.diagnostics.reference_remarks import held_by_friction, jumps
-from robot_dyn.simulation.observation.chatter import Episode
-from robot_dyn.simulation.observation.guard_levels import Level
-from robot_dyn.simulation.observation.observation import Observed, Visit
+from robot_dyn.simulation.diagnostics.reference_remarks import Units, held_by_friction, jumps
+from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
-Units = list[tuple[str, str, str]]  # units of q, v and u of each joint
+Remedy = Callable[[int, float], Facts]
+"""A function of a run and of the start of its chatter, in [s], that returns the facts of the remedy."""
 QUANTITIES = ("q", "v", "u")
 KINDS = (
     RemarkKind.EFFORT_REACHED,
@@ -56,17 +54,11 @@ def remarks(
         samples: q, v and u side by side, (m, 3n).
         power: Power of each source, (m,), in [W].
     """
-    units, n = units_of(setup.plant.dynamics), len(setup.q0)
-    v = samples[:, n : 2 * n]
-    of_run = (
-        setup.plant.dynamics.joint_names,
-        units,
-        observed.visits_of(0),
-        observed.episodes_of(0),
-        against(setup, t, samples[:, :n]),
-    )
+    units, n = units_of(joint_types_of(setup.plant.dynamics)), len(setup.q0)
+    names, v = setup.plant.dynamics.joint_names, samples[:, n : 2 * n]
     return (
-        *of_steps(*of_run), *_on_lines(setup, t, v, samples[:, 2 * n :], units),
+        *of_run(names, units, observed, lambda _, start: against(setup, t, samples[:, :n], start)),
+        *_on_lines(setup, t, v, samples[:, 2 * n :], units),
         *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
         *_creeping(setup, t, v, units), *of_reference(setup, t, observed.extremes[0], units),
     )  # fmt: skip
@@ -78,25 +70,44 @@ def of_reference(setup: Setup, t: np.ndarray, extremes: np.ndarray, units: Units
     yield from held_by_friction(setup, extremes, t, units)
 
 
-def of_steps(
-    names: tuple[str, ...], units: Units, visits: dict[Level, Visit], episodes: dict[int, Episode],
-    remedy: Callable[[Episode], Facts], instants: int = 0,
-) -> list[Remark]:  # fmt: skip
-    """Return remarks on the observations of a run: chatter, then levels.
+def of_run(names: tuple[str, ...], units: Units, observed: Observed, remedy: Remedy) -> list[Remark]:
+    """Return the remarks of `of_runs` on a single run; those on levels in the order of time."""
+    remarks = [remark for remark, _, _ in of_runs(names, units, observed, remedy)]
+    chatter = [remark for remark in remarks if remark.kind is RemarkKind.CHATTER]
+    return chatter + sorted(remarks[len(chatter) :], key=lambda remark: (KINDS.index(remark.kind), remark.start_s))
+
+
+def of_runs(
+    names: tuple[str, ...], units: Units, observed: Observed, remedy: Remedy
+) -> Iterator[tuple[Remark, int, np.ndarray]]:
+    """Yield remarks on the observations of B runs by joint and quantity: chatter, then levels.
+
+    Each is about the worst run; it comes with the index of that run, and True for each run that is affected, (B,).
 
     Args:
         names: Names of the joints.
         units: Units of the joints, see `units_of`.
-        visits: Visits by level.
-        episodes: Episodes of chatter, by joint.
-        remedy: Function of an episode that returns the facts of its remedy.
-        instants: See `Observed`.
+        observed: Observations of the runs.
+        remedy: Facts of the remedy for chatter.
     """
-    remarks = [*_chatter(names, units, episodes, remedy)]
-    for kind in KINDS:
-        of_kind = {level: visit for level, visit in visits.items() if level.kind is kind}
-        remarks += _passed(names, units, of_kind, instants)
-    return remarks
+    amplitudes = observed.episodes[:, :, 2]
+    for joint in np.argsort(-amplitudes.max(axis=0)).tolist():
+        if amplitudes[:, joint].any():
+            worst = int(amplitudes[:, joint].argmax())
+            start, duration, amplitude = observed.episodes[worst, joint].tolist()
+            facts: dict[str, float | str] = {**remedy(worst, start), "unit": units[joint][2]}
+            remark = Remark(RemarkKind.CHATTER, names[joint], "u", start, duration, start, amplitude, None, facts=facts)
+            yield remark, worst, amplitudes[:, joint] > 0
+    places = {(level.kind, level.row) for level in observed.levels}
+    for kind, row in sorted(places, key=lambda place: (KINDS.index(place[0]), place)):
+        both = [k for k, level in enumerate(observed.levels) if (level.kind, level.row) == (kind, row)]
+        _, duration, _, value = np.moveaxis(observed.visits[:, both], 2, 0)
+        some = ~np.isnan(duration).all(axis=1)
+        if some.any():
+            beyond = np.abs(value - observed.limits[:, both])
+            size = np.nansum(duration, axis=1) if kind is RemarkKind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
+            worst = int(np.nanargmax(np.where(some, size, np.nan)))
+            yield _passed(names, units, observed, both, worst), worst, some
 
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
@@ -153,74 +164,49 @@ def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Itera
             yield Remark(RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, facts=facts)
 
 
-def units_of(dynamics: Dynamics) -> Units:
+def units_of(joint_types: Iterable[str | None]) -> Units:
     """Return the units of q, v and u of each joint."""
-    return [(unit("q", kind), unit("v", kind), unit("u", kind)) for kind in joint_types_of(dynamics)]
+    return [(unit("q", kind), unit("v", kind), unit("u", kind)) for kind in joint_types]
 
 
-def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], instants: int) -> Iterator[Remark]:
-    """Yield the levels passed, both sides of a limit as one."""
-    n = len(units)
-    rows: dict[int, list[tuple[Level, Visit]]] = {}
-    for level, visit in sorted(visits.items(), key=lambda pair: pair[1].start):
-        rows.setdefault(level.row, []).append((level, visit))
-    for row, both in rows.items():
-        quantity, joint = divmod(row, n)
-        level, most = max(both, key=lambda pair: abs(pair[1].value - pair[0].limit))
-        start = min(x.start for _, x in both)
-        duration = sum({level.limit: x.duration for level, x in both}.values())  # both sides of a limit of 0 are one
-        facts: dict[str, float | str] = {"unit": units[joint][quantity]}
-        if QUANTITIES[quantity] == "u" and instants:
-            facts["instants"] = instants
-        yield Remark(
-            level.kind,
-            names[joint],
-            QUANTITIES[quantity],
-            start,
-            duration,
-            most.at,
-            most.value,
-            level.limit,
-            facts=facts,
-        )
+def _passed(names: tuple[str, ...], units: Units, observed: Observed, both: list[int], run: int) -> Remark:
+    """Return the remark on the levels of a quantity that a run has passed, `both` sides of a limit as one."""
+    level, limits = observed.levels[both[0]], observed.limits[run]
+    quantity, joint = divmod(level.row, len(units))
+    visits = [(*observed.visits[run, k].tolist(), float(limits[k])) for k in both if observed.visits[run, k, 0] >= 0]
+    visits.sort(key=lambda visit: visit[0])
+    _, _, at, value, limit = max(visits, key=lambda visit: abs(visit[3] - visit[4]))
+    duration = sum({limit: duration for _, duration, _, _, limit in visits}.values())  # both sides of 0 are one
+    facts: dict[str, float | str] = {"unit": units[joint][quantity]}
+    if QUANTITIES[quantity] == "u" and observed.instants[run]:
+        facts["instants"] = int(observed.instants[run])
+    of_joint = level.kind, names[joint], QUANTITIES[quantity]
+    return Remark(*of_joint, visits[0][0], duration, at, value, limit, facts=facts)
 
 
-def _chatter(
-    names: tuple[str, ...], units: Units, episodes: dict[int, Episode], remedy: Callable[[Episode], Facts]
-) -> Iterator[Remark]:
-    for joint, episode in sorted(episodes.items(), key=lambda pair: -pair[1].amplitude):
-        yield Remark(
-            RemarkKind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
-            None, facts={**remedy(episode), "unit": units[joint][2]},
-        )  # fmt: skip
+def against(setup: Setup, t: np.ndarray, q: np.ndarray, start: float) -> Facts:
+    """Return the facts of the remedy for chatter: the step, or the period and, if it explains the chatter, kd T/M.
 
-
-def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], Facts]:
-    """Return a function of an episode of chatter that returns the facts of its remedy.
+    The largest kd T/M is the eigenvalue of −M⁻¹ ∂u/∂v times T.
 
     Args:
         setup: The setup of the run.
         t: Times of samples, (m,), in [s].
         q: Positions there, (m, n).
+        start: Start of the chatter, in [s].
     """
     period = setup.controller.period_s if setup.controller else 0.0
     if not period:
-        return lambda episode: {"step_s": setup.taken_step_s}
-    return lambda episode: _remedy(
-        setup, episode.start, q[np.clip(np.searchsorted(t, episode.start), 0, len(t) - 1)], period
-    )
-
-
-def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> Facts:
-    """Return the period and, if it explains a chatter, the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times T."""
-    general: Facts = {"period_s": period}
+        return {"step_s": setup.taken_step_s}
+    general, q = {"period_s": period}, q[np.clip(np.searchsorted(t, start), 0, len(t) - 1)]
     controller = setup.controller.controller if isinstance(setup.controller, Loop) else setup.controller
     assert controller is not None
     z, v = np.zeros(controller.state_size), np.zeros(len(q))
     try:
         with np.errstate(all="ignore"):
-            slope = by_state(rowwise(lambda v: controller.torque(t, q, v, z)), t, v).T
-            ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.at(t).M(q), -slope))).max()) * period
+            slope = by_state(rowwise(lambda v: controller.torque(start, q, v, z)), start, v).T
+            M = setup.plant.at(start).M(q)
+            ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(M, -slope))).max()) * period
     except (RobotDynError, np.linalg.LinAlgError):
         return general
     if ratio <= 1 and (blocks := _of_sensors(setup.controller)):

@@ -134,8 +134,7 @@ class Lanes(NamedTuple):
         failed: 1 where the stages of a step were not found, (W,).
         inner: State within a step, (m, W).
         sampled, command, u, energies, size: Workspace for a sample, a tick, the actuation, K and V, and Σ |y⁺|.
-        alive: 1 while the run continues, (W,).
-        reason: Reason for which the run ended, see `LaneEnd`, (W,).
+        reason: Reason for which the run ended, 0 while it continues, see `LaneEnd`, (W,).
         end_time, end_state: Time, in [s], and state at its end, (W,) and (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|, (W,).
         peak: Largest K at the energy checks, (W,).
@@ -153,7 +152,6 @@ class Lanes(NamedTuple):
     u: Array
     energies: Array
     size: Array
-    alive: Array
     reason: Array
     end_time: Array
     end_state: Array
@@ -258,7 +256,6 @@ def lanes_of(
         p=p.copy(),
         run_parameters=np.array(run_parameters, order="C"),
         failed=np.zeros(W, np.int64),
-        alive=np.ones(W, np.int64),
         reason=np.zeros(W, np.int64),
         scale=np.ones(W),
         keys=keys,
@@ -271,7 +268,7 @@ def erase_ended(x: Array, lanes: Lanes) -> None:
     """Write nan into x (r, W) for the runs that have ended."""
     if below(lanes.reason, 1):
         return
-    for b in range(len(lanes.alive)):
-        if lanes.alive[b] == 0:
+    for b in range(len(lanes.reason)):
+        if lanes.reason[b] != 0:
             for e in range(len(x)):
                 x[e, b] = np.nan

@@ -21,7 +21,8 @@ from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant, carrying, in_mode
 from robot_dyn.effects.set_valued import Mode
 from robot_dyn.foundations.arithmetic import Array, Scalar
-from robot_dyn.foundations.errors import RobotDynError, call
+from robot_dyn.foundations.errors import EffectError, RobotDynError, call
+from robot_dyn.foundations.threshold import Layer, Threshold
 from robot_dyn.foundations.values import Caching
 from robot_dyn.queries.dynamics import acceleration
 
@@ -119,9 +120,34 @@ class StateEquation(Caching):
         """Return y at the start, (m,), with the states of the effects; those of the controller and the works are 0."""
         second = self.plant.dynamics.momentum(q, v) if self.canonical else v
         y = np.concatenate([q, second, np.zeros(self.states + len(self.sources))])
-        first = 2 * len(q) + self.state_size
-        y[first : first + self.equation_of_motion.state_size] = self.equation_of_motion.start(q, v)
+        y[self._place(slice(0, self.equation_of_motion.state_size))] = self.equation_of_motion.start(q, v)
         return y
+
+    def _place(self, states: slice) -> slice:
+        """Return the entries of y with these states of effects."""
+        first = 2 * self.plant.dynamics.n + self.state_size
+        return slice(first + states.start, first + states.stop)
+
+    def place_of(self, part: object) -> slice | None:
+        """Return the entries of y that are the states of the controller or of an effect; None if it has none."""
+        if part is self.controller:
+            n = self.plant.dynamics.n
+            return slice(2 * n, 2 * n + self.state_size)
+        places = self.equation_of_motion.states.items()
+        return next((self._place(states) for k, states in places if self.plant.effects[k] is part), None)
+
+    def row(self, part: int | None, declared: Threshold | Layer) -> int:
+        """Return the entry of y that a threshold or a layer of part `part` concerns; for None, an entry of q or v.
+
+        Raises:
+            EffectError: If it is a threshold of a state, and the part has no states.
+        """
+        if declared.state is None or part is None:
+            return declared.joint + self.plant.dynamics.n * declared.of_velocity
+        if part not in self.equation_of_motion.states:
+            name = declared.name if isinstance(declared, Threshold) else "layer"
+            raise EffectError(f"{name}: is a threshold of a state, and the part that declares it has none")
+        return self._place(self.equation_of_motion.states[part]).start + declared.state
 
     def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Return q, v, z, W of y, with z the states of the controller, then of the effects, then the impulses."""
@@ -137,10 +163,9 @@ class StateEquation(Caching):
 
     def effect_states(self, y: Array) -> dict[str, Array]:
         """Return the states of each effect with states in states y (k, m), (k, size), by name."""
-        first, equation = 2 * self.plant.dynamics.n + self.state_size, self.equation_of_motion
-        names = numbered(*(self.plant.effects[k].name for k in equation.states))
-        places = zip(names, equation.states.values(), strict=True)
-        return {name: y[:, first + place.start : first + place.stop].copy() for name, place in places}
+        states = self.equation_of_motion.states
+        names = numbered(*(self.plant.effects[k].name for k in states))
+        return {name: y[:, self._place(place)].copy() for name, place in zip(names, states.values(), strict=True)}
 
     def stored(self, t: Array, y: Array) -> dict[str, Array]:
         """Return the energy stored by each effect with states, at times t (k,) and states y (k, m), (k,), by name."""
@@ -155,10 +180,18 @@ class StateEquation(Caching):
             for effect, (name, z) in zip(effects, self.effect_states(y).items(), strict=True)
         }
 
-    def velocities(self, y: Array) -> Array:
-        """Return the velocities v in states y (k, m), (k, n)."""
-        n = self.plant.dynamics.n
-        return np.array([self.state(row)[1] for row in y]).reshape(-1, n) if self.canonical else y[:, n : 2 * n]
+    def with_velocities(self, y: Array) -> Array:
+        """Return states y (k, m) with velocities instead of momenta."""
+        if not self.canonical:
+            return y
+        n, y = self.plant.dynamics.n, y.copy()
+        y[:, n : 2 * n] = np.array([self.state(row)[1] for row in y]).reshape(-1, n)
+        return y
+
+    def motion(self, y: Array) -> tuple[Array, Array]:
+        """Return the positions and the velocities in states y (k, m), (k, n) each."""
+        n, y = self.plant.dynamics.n, self.with_velocities(y)
+        return y[:, :n], y[:, n : 2 * n]
 
     def fastest_joint(self, y: Array) -> str:
         """Return the name of the joint with the largest |v|, or |p| if M cannot be inverted, at a state y (m,)."""

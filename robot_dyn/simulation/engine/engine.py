@@ -40,13 +40,11 @@ class Evaluated(NamedTuple):
         functions: Functions for the time loop; addresses if the loop is machine code.
         in_python: The same functions as Python functions.
         numbers: Parameters of the functions, (P,); they follow the actuation in zero-order hold in `run_parameters`.
-        by_numbers: True if other coefficients, such as those of a mode, change only the numbers.
     """
 
     functions: Functions
     in_python: Functions
     numbers: np.ndarray
-    by_numbers: bool
 
 
 class Engine(Protocol):
@@ -65,14 +63,11 @@ class Engine(Protocol):
         step       a step in which velocities may jump; see `RightSide`, also for `after_step`
 
     Attributes:
-        exact_right_angles: True if right angles of the robot's file are used to all digits of float64.
-        doubtful: Σ |y| beyond which the interpreted equation repeats a step of fixed length.
-        most_threads: Number of threads that may use it at the same time.
+        is_compiled: True for machine code. It uses right angles of the robot's file to all digits of float64, changes
+            only its numbers for other coefficients, such as those of a mode, and runs in any number of threads.
     """
 
-    exact_right_angles: ClassVar[bool]
-    doubtful: ClassVar[float]
-    most_threads: ClassVar[float]
+    is_compiled: ClassVar[bool]
 
     @property
     def equation(self) -> StateEquation:

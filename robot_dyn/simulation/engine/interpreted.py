@@ -31,9 +31,7 @@ class Interpreted:
     equation: StateEquation
     label: str = "interpreted"
     most_evaluations: float = inf
-    exact_right_angles: ClassVar[bool] = False
-    doubtful: ClassVar[float] = inf
-    most_threads: ClassVar[float] = 1
+    is_compiled: ClassVar[bool] = False
     most_steps: float = field(default=1, init=False)
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
@@ -42,7 +40,7 @@ class Interpreted:
             functions, numbers = in_modes(equation, watch), np.zeros(3 * equation.plant.dynamics.n)
         else:
             functions, numbers = interpreted(equation, watch), np.zeros(0)
-        return Evaluated(functions, functions, numbers, False)
+        return Evaluated(functions, functions, numbers)
 
     def places(self) -> Places:
         """Return the places of the mode; apart from the zero-order hold, the run parameters are the mode."""
@@ -168,7 +166,7 @@ def system(
     equation: StateEquation,
     p: Array,
     run_parameters: Array,
-    seen: Array | None = None,
+    latest: Array | None = None,
     exact: bool = True,
 ) -> System:
     """Return the equation y' = f(t, y) on one segment.
@@ -178,18 +176,16 @@ def system(
         equation: The state equation.
         p: Numbers of the segment.
         run_parameters: Torques of a sampled controller in zero-order hold, (n, 1); (0, 1) without one.
-        seen: Array for v and u of the latest evaluation, (2n,), or None.
+        latest: Array for y' and u of the latest evaluation, (m + n, 1), or None.
         exact: True to use the Jacobian of `functions` if there is one; False for differences.
     """
     n, m = equation.plant.dynamics.n, equation.size
-    out, J = np.empty((m + n, 1)), np.empty((m + 1, m, 1))
+    out, J = np.empty((m + n, 1)) if latest is None else latest, np.empty((m + 1, m, 1))
 
     def rate(t: Any, y: Array) -> Array:
         if y.ndim > 1:  # states of the differences for a Jacobian
             return np.array([rate(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
         evaluate(functions.rate, float(t), np.ascontiguousarray(y)[:, None], p, run_parameters, out)
-        if seen is not None:
-            seen[:n], seen[n:] = out[:n, 0], out[m:, 0]
         return out[:m, 0].copy()
 
     def derivatives(t: Any, y: Array) -> Array:

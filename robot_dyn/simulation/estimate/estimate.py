@@ -14,7 +14,7 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.adaptive import MIN_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.imbalance import finer
-from robot_dyn.simulation.diagnostics.missed_events import Missed, cut_alike, stepped_over
+from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.diagnostics.smoothness import first_crossing, first_kink
 from robot_dyn.simulation.diagnostics.stiff_motion import damped_oscillation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -29,7 +29,7 @@ from robot_dyn.simulation.estimate.verdicts import (
     meaningless,
     rounding,
 )
-from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
+from robot_dyn.simulation.results.doubts import Doubt, DoubtKind, Onset
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.recording import Path, Recording
@@ -116,11 +116,9 @@ def _by_steps(
     return shorter if shorter.until_s >= result.until_s else result
 
 
-def _up_to(result: ErrorEstimate, missed: Missed | None) -> ErrorEstimate:
+def _up_to(result: ErrorEstimate, missed: Onset) -> ErrorEstimate:
     """Return the estimate, which ends at the time of a missed event."""
-    if missed is None or missed.t >= result.until_s:
-        return result
-    return replace(result, until_s=missed.t, ends_early=missed.doubt)
+    return result if missed.t >= result.until_s else replace(result, until_s=missed.t, ends_early=missed.doubt)
 
 
 def _by_refinement(
@@ -139,7 +137,8 @@ def _by_refinement(
         halves = np.setdiff1d(halves, [event.t for event in run.events], assume_unique=True)
     tight = None
     if estimated.kink < np.inf and method.rtol / 10 > MIN_RTOL:
-        tight = runner.run(_tolerant(setup, method, 0.1)).shared
+        tenth = method.with_tolerances(0.1, method.max_step_s)
+        tight = runner.run(with_values(setup, {"method": tenth})).shared  # the other values were checked
     halved = runner.run(setup, halves).shared
     gap = differences(estimated.path, halved, estimated.n)
     if estimated.begins_as_rounding(gap, ends[min(_EARLY, len(ends) - 1)]):
@@ -153,12 +152,6 @@ def _with_rounding(estimated: Estimated, pushed: Path, companion: Path, units: f
         return estimated
     rounds = carried(companion, differences(companion, pushed, estimated.n) * (PUSH / units), estimated.n)
     return replace(estimated, floor=np.fmax(estimated.floor, at_states(estimated.path, companion, rounds)))
-
-
-def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
-    """Return the setup with the tolerances of its method multiplied by a factor."""
-    method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
-    return with_values(setup, {"method": method})  # the other values were checked
 
 
 def _pushed(setup: Setup, units: float = PUSH) -> Setup:

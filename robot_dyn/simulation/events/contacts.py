@@ -16,7 +16,7 @@ from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.contact_mode import ContactLaws, ContactMode, EventWorkspace, Places
 from robot_dyn.simulation.events.event_log import EventKind, event_log
-from robot_dyn.simulation.events.mode_change import REACTIONS, guard_count, rows_of_event, start_mode
+from robot_dyn.simulation.events.mode_change import REACTIONS, guard_count, rows_of_event
 
 _IMPACTS = 64  # that are stored
 _STOP = {-1: "lower stop", 1: "upper stop"}
@@ -43,10 +43,6 @@ class Contacts:
 
     def __init__(self, equation: StateEquation, mode: ContactMode) -> None:
         self.equation, self.mode = equation, mode
-
-    def start(self, y: np.ndarray) -> None:
-        """Write the mode at the start; see `start_mode`."""
-        start_mode(self.mode, y[:, None].copy())
 
     @property
     def mode_of_effects(self) -> Mode:
@@ -122,11 +118,12 @@ def laws_of(equation: StateEquation) -> ContactLaws:
     """
     n, motion = equation.plant.dynamics.n, equation.equation_of_motion
     working: list[Any] = [effect for effect in equation.plant.forces if not isinstance(effect, Conservative)]
-    first_work, first_state = equation.size - len(equation.sources) + 1, 2 * n + equation.state_size
-    gaps = []
-    for k, place in motion.states.items():
-        if isinstance(effect := motion.effects[k], RigidBacklash):
-            gaps.append(_gap_columns(effect, n, first_state + place.start, first_work + working.index(effect)))
+    first_work = equation.size - len(equation.sources) + 1
+    gaps = [
+        _gap_columns(effect, n, place.start, first_work + working.index(effect))
+        for effect in motion.effects
+        if isinstance(effect, RigidBacklash) and (place := equation.place_of(effect)) is not None
+    ]
     columns = [np.concatenate(column) for column in zip(*gaps, strict=True)] if gaps else [np.zeros(0)] * 9
     joints, delta, speed, motors, impulse, work, inertia, half_gap, e = columns
     others = [effect for effect in motion.set_valued if not isinstance(effect, RigidStops)]

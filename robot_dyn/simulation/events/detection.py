@@ -67,36 +67,6 @@ class DetectingWork(NamedTuple):
     events: LaneEvents
 
 
-def lane_events(
-    rows: Array, coordinates: int, levels: Array, rate_rows: int, functions: int, positions: int
-) -> LaneEvents:
-    """Return the switching functions of runs, whose sides, rates and values are not yet evaluated; see `start`.
-
-    Args:
-        rows: Entries of y and of the functions, (K,).
-        coordinates: Number of coordinates.
-        levels: Levels, (K, W).
-        rate_rows: Number of entries of a rate.
-        functions: Number of functions.
-        positions: Number of positions.
-    """
-    W, rate, values = levels.shape[1], (rate_rows if coordinates else 0, levels.shape[1]), (functions, levels.shape[1])
-    return LaneEvents(
-        rows=rows,
-        coordinates=coordinates,
-        positions=positions,
-        levels=np.array(levels, order="C"),
-        sides=np.zeros(levels.shape),
-        rate=np.zeros(rate),
-        next_rate=np.zeros(rate),
-        values=np.zeros(values),
-        next_values=np.zeros(values),
-        change=np.zeros(values),
-        until=np.full(W, np.inf),
-        left=np.array([W]),
-    )
-
-
 def enclosure(x0: float, x1: float, d0: float, d1: float, h: float) -> tuple[float, float]:
     """Return bounds of the cubic through two values and rates."""
     a, b = x0 + h * d0 / 3, x1 - h * d1 / 3

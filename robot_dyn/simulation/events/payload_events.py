@@ -77,8 +77,8 @@ def _transferred(
     carried, happened = list(was), []
 
     def energies(v: np.ndarray) -> np.ndarray:
-        of = _carrying(equation, tuple(carried)).equation_of_motion
-        return np.array(of.energies(np.array([t]), q[None], v[None]))[:, 0]
+        motion = _carrying(equation, tuple(carried)).equation_of_motion
+        return np.array(motion.energies(np.array([t]), q[None], v[None]))[:, 0]
 
     def momentum() -> np.ndarray:
         return carrying(equation.plant, tuple(carried)).dynamics.momentum(q, v)

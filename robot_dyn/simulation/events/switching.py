@@ -10,7 +10,6 @@ import numpy as np
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.integrate.bernstein import work_array
 from robot_dyn.simulation.dynamics.event import Occurrence
@@ -46,21 +45,15 @@ class Switching:
         parts = {k: effect.thresholds(n) for k, effect in enumerate(equation.plant.effects)}
         if equation.controller is not None and not equation.sampled:
             parts[CONTROLLER] = equation.controller.thresholds()
-        self._of_part = {k: tuple(x for x in of if self._is_active(k, x)) for k, of in parts.items()}
-        coordinates = dict.fromkeys(
-            (k if x.own else None, x) for k, of in self._of_part.items() for x in of if not x.of_actuation
-        )
+        self._of_part = {k: tuple(x for x in declared if self._is_active(k, x)) for k, declared in parts.items()}
+        active = [(k, x) for k, declared in self._of_part.items() for x in declared]
+        coordinates = dict.fromkeys((k if x.own else None, x) for k, x in active if not x.of_actuation)
         actuation = [(k, x) for k in equation.limited for x in self._of_part[k] if x.of_actuation]
         self.coordinates = len(coordinates)
         self.thresholds: tuple[Threshold, ...] = tuple(x for _, x in (*coordinates, *actuation))
         self._parts: tuple[int | None, ...] = tuple(k for k, _ in (*coordinates, *actuation))
         self.contacts, self.guards = contacts, 0 if contacts is None else len(contacts.guards[0])
         self._equations: dict[bytes, StateEquation] = {}
-
-    @property
-    def quantities(self) -> frozenset[Quantity]:
-        """All quantities that have a threshold."""
-        return frozenset((threshold.joint, threshold.of_actuation) for threshold in self.thresholds)
 
     def _is_active(self, part: int, threshold: Threshold) -> bool:
         if (threshold.joint, threshold.of_actuation) in self.dropped:  # the formulas of a joint depend on each other
@@ -74,7 +67,7 @@ class Switching:
         """The row of each threshold: an entry of y, or of the actuation of the limited parts."""
         place: dict[int | None, int] = {k: self._n * i for i, k in enumerate(self.equation.limited)}
         pairs = list(zip(self._parts, self.thresholds, strict=True))
-        coordinates = [self._row(part, threshold) for part, threshold in pairs[: self.coordinates]]
+        coordinates = [self.equation.row(part, threshold) for part, threshold in pairs[: self.coordinates]]
         actuation = [place[part] + threshold.joint for part, threshold in pairs[self.coordinates :]]
         return np.array([*coordinates, *actuation], np.int64)
 
@@ -140,15 +133,6 @@ class Switching:
             write_guards(self.contacts.mode, y[:, None].copy(), table)
         return table
 
-    def _row(self, part: int | None, threshold: Threshold) -> int:
-        """Return the entry of y that passes a threshold."""
-        if threshold.state is None or part is None:
-            return threshold.joint + self._n * threshold.of_velocity
-        if part not in self.equation.equation_of_motion.states:
-            raise EffectError(f"{threshold.name}: is a threshold of a state, and the part that declares it has none")
-        first = 2 * self._n + self.equation.state_size
-        return first + self.equation.equation_of_motion.states[part].start + threshold.state
-
     def _moving(
         self, t: float, y: np.ndarray, held: Array | None, rows: np.ndarray, distances: np.ndarray
     ) -> np.ndarray:  # fmt: skip
@@ -169,7 +153,7 @@ class Switching:
                 (part, threshold): int(side)
                 for part, threshold, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
-            at = {k: {x: side_of[k if x.own else None, x] for x in of} for k, of in self._of_part.items()}
+            at = {k: {x: side_of[k if x.own else None, x] for x in declared} for k, declared in self._of_part.items()}
             equation, n = self.equation, self._n
             effects: list[Effect] = [
                 effect.on_side(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)

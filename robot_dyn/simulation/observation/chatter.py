@@ -9,8 +9,7 @@ Plain functions of arrays (n, W) over joints and runs; both time loops call them
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,16 +22,6 @@ _LEAST = 1e-6  # fraction of the largest actuation of any joint so far; smaller 
 _OTHER = 10.0  # ratio of amplitudes above which the smaller of two episodes is not reported
 
 
-@final
-@dataclass
-class Episode:
-    """Chatter of a joint: start of its first row of reversals, total duration, and amplitude of u in these rows."""
-
-    start: float
-    duration: float
-    amplitude: float
-
-
 class Chatter(NamedTuple):
     """The reversals of W runs.
 
@@ -43,7 +32,8 @@ class Chatter(NamedTuple):
         reversals: Reversals in a row so far, (n, W).
         streak: Start, duration and amplitude of the current row, (3, n, W).
         active_runs: Number of runs with a current row, (n,).
-        episodes: Start, duration and amplitude of the reported episodes, (3, n, W); amplitude 0 for none.
+        episodes: Start of the first reported row of each joint, duration and amplitude of u in all reported rows,
+            (3, n, W); amplitude 0 for none.
     """
 
     t: Array

@@ -17,7 +17,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.store import Layout
 from robot_dyn.foundations.values import ReadOnly, aligned
 from robot_dyn.integrate.primitives import enclose
-from robot_dyn.simulation.observation.chatter import Chatter, Episode, chatters_of, close_all, tick
+from robot_dyn.simulation.observation.chatter import Chatter, chatters_of, close_all, tick
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
 
 _NONE: Mapping[int, Observation] = MappingProxyType({})
@@ -89,7 +89,7 @@ def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Obser
     ]
 
 
-NEGLIGIBLE = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # before any step
+UNOBSERVED = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # of no run: nothing is observed
 
 
 def observe(observation: Observation, began: float, t: float, q: Array, v: Array, u: Array, acted: bool) -> None:
@@ -152,17 +152,6 @@ def visit(visits: Array, side: float, bounds: Array, x: Array, began: float, t: 
 
 
 @final
-@dataclass
-class Visit:
-    """The time a quantity spent beyond a level: from `start`, `duration` in all, farthest at `at` with `value`."""
-
-    start: float
-    duration: float
-    at: float
-    value: float
-
-
-@final
 @dataclass(frozen=True, eq=False, repr=False)
 class Observed(ReadOnly):
     """The observations of B runs of n joints from start to end.
@@ -190,18 +179,6 @@ class Observed(ReadOnly):
         """Return the observations of some of the runs."""
         arrays = {name: getattr(self, name)[runs] for name in ("extremes", "instants", "limits", "visits", "episodes")}
         return replace(self, **arrays)
-
-    def visits_of(self, run: int) -> dict[Level, Visit]:
-        """Return the visits of a run by level."""
-        return {
-            replace(self.levels[k], limit=float(self.limits[run, k])): Visit(*self.visits[run, k].tolist())
-            for k in np.flatnonzero(~np.isnan(self.visits[run, :, 0]))
-        }
-
-    def episodes_of(self, run: int) -> dict[int, Episode]:
-        """Return the episodes of chatter of a run by joint."""
-        joints = np.flatnonzero(self.episodes[run, :, 2])
-        return {int(joint): Episode(*self.episodes[run, joint].tolist()) for joint in joints}
 
 
 def observed(

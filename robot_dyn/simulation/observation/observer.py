@@ -12,11 +12,10 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached, copied
 from robot_dyn.simulation.observation.guard_levels import NO_LEVELS, GuardLevels, guard_levels
-from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observe, observed
+from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.setup.setup import Setup
 
 CHUNK = 16384  # columns processed together: with fewer, the overhead of NumPy calls dominates
@@ -33,20 +32,16 @@ class Observer:
     Args:
         start: The observation before the first step, which is continued.
         levels: Levels to observe.
-        canonical: True if steps are in (q, p).
 
     Attributes:
         observation: The observation so far.
         columns: End of each step, in [s]; q and v at its end; actuation u during it; (1 + 3n, CHUNK + padding).
         filled: Number of columns written.
-        seen: v and u of the latest evaluation of the equation of motion, (2n,).
-        canonical: True if steps are in (q, p).
     """
 
-    def __init__(self, start: Observation, levels: GuardLevels = NO_LEVELS, canonical: bool = False) -> None:
-        self.n, self.canonical = len(start.low) // 3, canonical
+    def __init__(self, start: Observation, levels: GuardLevels = NO_LEVELS) -> None:
+        self.n = len(start.low) // 3
         self.columns, self.filled, self._chunk = np.empty((1 + 3 * self.n, CHUNK + _PAD)), 0, CHUNK
-        self.seen = np.zeros(2 * self.n)
         self.observation, self._levels = start, levels
         self._edges, self._width, self._closing = np.zeros(1), _WINDOW, Lock()
         self._low, self._high = (np.empty((0, 3 * self.n)) for _ in range(2))
@@ -61,25 +56,6 @@ class Observer:
         """Largest speed of each joint so far, (n,)."""
         v = slice(self.n, 2 * self.n)
         return np.maximum(-self.observation.low[v, 0], self.observation.high[v, 0])
-
-    def step(self, began: float, t: float, y: Array, acted: bool) -> None:
-        """Add a step from `began` to t that ends in the state y, with the actuation in `seen`.
-
-        Args:
-            began: Start of the step, in [s].
-            t: End of the step, in [s].
-            y: State at its end.
-            acted: True if the controller acted at its start.
-        """
-        n, column = self.n, self.columns[:, self.filled]
-        column[0], column[1 : 1 + 2 * n] = t, y[: 2 * n]
-        column[1 + 2 * n :] = self.seen[n:]
-        if self.canonical:
-            column[1 + n : 1 + 2 * n] = self.seen[:n]
-        q, v, u = column[1:].reshape(3, n, 1)
-        observe(self.observation, began, t, q, v, u, acted)
-        self.filled += 1
-        self.process()
 
     def process(self, end: bool = False) -> None:
         """Process the columns if no column is free, or at the end of the run."""
@@ -132,9 +108,9 @@ class Observer:
 def observer_of(setup: Setup, levels: GuardLevels | None = None) -> Observer:
     """Return the observer of a run before its first step, for the levels of the setup unless others are given."""
     if levels is not None:
-        return Observer(_observation(setup, levels), levels, setup.equation.canonical)
+        return Observer(_observation(setup, levels), levels)
     levels, start = cached(setup, observed_start)
-    return Observer(copied(start), levels, setup.equation.canonical)
+    return Observer(copied(start), levels)
 
 
 def observed_start(setup: Setup) -> tuple[GuardLevels, Observation]:

@@ -7,10 +7,11 @@ to `_SENTENCES`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import final
+from math import inf
+from typing import NamedTuple, final
 
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.sentences import Part, Parts, sentence
@@ -134,3 +135,15 @@ class Doubt:
 
     def __str__(self) -> str:
         return f"{self.text}; {self.remedy}" if self.remedy else self.text
+
+
+class Onset(NamedTuple):
+    """Time from which a doubt applies, in [s], and the doubt; inf and None for no doubt."""
+
+    t: float = inf
+    doubt: Doubt | None = None
+
+
+def first_onset(onsets: Iterable[Onset]) -> Onset:
+    """Return the onset with the earliest time."""
+    return min(onsets, key=lambda onset: onset.t, default=Onset())

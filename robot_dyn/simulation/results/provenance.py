@@ -25,7 +25,7 @@ from robot_dyn.foundations.portable_bits import has_portable_bits
 from robot_dyn.model.findings import reading_findings
 from robot_dyn.model.right_angles import right_angle_note
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.simulation.results.acting import frame_of, rotors_of
 from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.setup.settings import settings_of
 from robot_dyn.simulation.setup.setup import Setup
@@ -33,10 +33,12 @@ from robot_dyn.simulation.setup.setup import Setup
 _LISTED = 4  # findings in a summary
 
 
-def origin(dynamics: Dynamics) -> dict[str, str]:
-    """Return the origin of a run as texts: URDF, its path, edits and versions."""
-    robot = getattr(dynamics, "robot", dynamics)
-    texts = {"versions": versions()}
+def origin(setup: Setup, compiled: bool) -> dict[str, str]:
+    """Return the origin of a run as texts: URDF, path, edits, controlled frame, rotors, machine code and versions."""
+    robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
+    texts = frame_of(setup) | rotors_of(setup) | {"versions": versions()}
+    if compiled:
+        texts |= edits_of_machine_code(setup) | ({"bits": "portable"} if has_portable_bits() else {})
     if isinstance(robot, Robot):
         urdf = robot.description.text.decode(errors="replace")
         texts |= {"robot": robot.name, "source": robot.description.source}
@@ -52,11 +54,6 @@ def edits_of_machine_code(setup: Setup) -> dict[str, str]:
         setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ())
     )
     return {"right_angles": edited_angles} if edited_angles else {}
-
-
-def bits_of_machine_code() -> dict[str, str]:
-    """Return "portable" as a text of a run if its machine code is portable."""
-    return {"bits": "portable"} if has_portable_bits() else {}
 
 
 def settings_text(setup: Setup) -> dict[str, str]:

@@ -91,8 +91,8 @@ def differences(
     """Yield the difference of each quantity, from its values (k,) or (k, …) in k uncut and k cut runs."""
     for name, x in uncut.items():
         y = cut[name]
-        known, same = np.isfinite(x) & np.isfinite(y), (x == y) | (np.isnan(x) & np.isnan(y))
+        finite, same = np.isfinite(x) & np.isfinite(y), (x == y) | (np.isnan(x) & np.isnan(y))
         gaps = np.full(x.shape, np.inf)
-        np.subtract(x, y, out=gaps, where=known)
+        np.subtract(x, y, out=gaps, where=finite)
         of_run = np.where(same, 0.0, np.abs(gaps)).reshape(len(x), -1).max(axis=1)
         yield Difference(name, units.get(name, ""), float(np.median(of_run)), float(of_run.max()))

@@ -19,6 +19,8 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.model.right_angles import robot_of
+from robot_dyn.simulation.compiled.cache import machine_code
+from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.compiled.machine_code import MachineCode
 from robot_dyn.simulation.diagnostics.runaway import speed_limits
 from robot_dyn.simulation.dynamics.loop_state import Ended, LaneEnd, lanes_of, loop_config, start_position
@@ -45,6 +47,12 @@ _REASONS = {
     LaneEnd.NO_STAGES: Reason.STAGES_NOT_FOUND,
 }
 _INSTANTS = 200  # least number of instants at which an actuation that changes between ticks is observed
+
+
+def lanes_code(batch: Batch, detects: bool = False) -> MachineCode:
+    """Return the machine code of runs in lock step, checked; see `machine_code` for `detects`."""
+    setup, options = batch.setup, {"extras": batch.extras, "swept": tuple(batch.sweep), "detects": detects}
+    return checked(setup, lambda: machine_code(setup.equation, setup.method, lanes=LANES, **options))
 
 
 @final
@@ -150,17 +158,10 @@ class Tiles:
         advance = self.code.machine_loop.calls()
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        position, none = self.positions[tile], np.empty((0, equation.size))
+        position = self.positions[tile]
         position.budget[0] = np.iinfo(np.int64).max
-        records = records_of(
-            rows=self.rows,
-            y=self.out_y,
-            sampled=self.out_extras,
-            shared=none,
-            step_log=none,
-            columns=np.empty((1 + 3 * n, 0)),
-            observation=self.observations[tile],
-        )
+        arrays = self.rows, self.out_y, self.out_extras
+        records = records_of((equation.size, n), *arrays, observation=self.observations[tile])
         config = loop_config(equation, alone=False)._replace(
             largest=LARGEST,
             base=lanes.start,

@@ -60,7 +60,7 @@ def singles(
         if on_progress is not None:
             on_progress(setup.duration_s * sum(record is not None for record in records) / len(records))
 
-    in_threads(make, len(records), int(min(threads, engine.most_threads)), stop, report)
+    in_threads(make, len(records), threads if engine.is_compiled else 1, stop, report)
     if on_progress is not None and not stop[0]:
         on_progress(setup.duration_s)
     return records, engine

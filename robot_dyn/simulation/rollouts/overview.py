@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.queries.units import unit
-from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held_by_friction, jumps
+from robot_dyn.queries.units import joint_types_of
+from robot_dyn.simulation.diagnostics.reference_remarks import Units, at_rest, held_by_friction, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import (
-    KINDS,
     QUANTITIES,
-    Units,
+    Remedy,
     against,
     of_reference,
-    of_steps,
+    of_run,
+    of_runs,
     units_of,
 )
 from robot_dyn.simulation.diagnostics.unstable_loop import unstable
-from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
-from robot_dyn.simulation.rollouts.reasons import states
-from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData, samples_of
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData, states_of
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
@@ -35,9 +33,9 @@ OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
 def overview(runs: RolloutsData) -> Overview:
     """Return the overview of runs with their setup."""
 
-    def remedy(run: int) -> Callable[[Episode], Facts]:
+    def remedy(run: int, start: float) -> Facts:
         setup = runs.setup_of(run)
-        return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run])
+        return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run], start)
 
     errors, remarks = rms_tracking_errors(runs), tuple(_remarks(runs, remedy))
     worst = worst_of(runs, remarks, errors)
@@ -55,10 +53,10 @@ def remarks_on_each(runs: RolloutsData) -> tuple[Remark, ...]:
         joint = runs.joint_names.index(remark.joint)
         return kinds.index(remark.kind), QUANTITIES.index(remark.quantity), joint
 
-    return tuple(sorted(_remarks(runs, lambda _: lambda _: {}), key=place))
+    return tuple(sorted(_remarks(runs, lambda *_: {}), key=place))
 
 
-def _remarks(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
+def _remarks(runs: RolloutsData, remedy: Remedy) -> Iterator[Remark]:
     """Yield remarks on observations and on the reference, with a remedy for the chatter of a run."""
     yield from _counted(runs, remedy)
     if runs.setup is not None:
@@ -78,7 +76,7 @@ def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
     """Return the overview of runs without their setup, which have these numbers in a larger batch."""
     errors = None if whole.rms_tracking_error is None else whole.rms_tracking_error[numbers]
     facts = {remark.kind: remark.facts for remark in whole.remarks}
-    remarks = *_counted(runs, lambda _: lambda _: facts[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
+    remarks = *_counted(runs, lambda *_: facts[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
     alone = (remark for remark in whole.remarks if remark.looked == 1 != len(numbers) and remark.runs[0] in numbers)
     remarks += tuple(replace(remark, runs=(numbers.index(remark.runs[0]),)) for remark in alone)
     return Overview(worst_of(runs, remarks, errors), remarks, errors)
@@ -86,10 +84,11 @@ def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
 
 def remarks_of(runs: RolloutsData, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
     """Return the remarks on the observations of one run, with positions q (m, n) at times t (m,)."""
-    visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
-    remedy = (lambda _: {}) if setup is None else against(setup, t, q)
-    instants = int(runs.observed.instants[run])
-    remarks = of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants)
+
+    def remedy(_: int, start: float) -> Facts:
+        return {} if setup is None else against(setup, t, q, start)
+
+    remarks = of_run(runs.joint_names, units(runs), runs.observed[run : run + 1], remedy)
     if setup is not None:
         remarks += of_reference(setup, t, runs.observed.extremes[run], units(runs))
     elif runs.saved is not None:
@@ -109,33 +108,13 @@ def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
 
 def units(runs: RolloutsData) -> Units:
     """Return the units of q, v and u of each joint."""
-    if runs.setup is not None:
-        return units_of(runs.setup.plant.dynamics)
-    return [(unit("q", kind), unit("v", kind), unit("u", kind)) for kind in joint_types(runs)]
+    return units_of(joint_types(runs) if runs.setup is None else joint_types_of(runs.setup.plant.dynamics))
 
 
-def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
+def _counted(runs: RolloutsData, remedy: Remedy) -> Iterator[Remark]:
     """Yield, for each kind, joint and quantity, the remark on the worst run, with the numbers of the affected runs."""
-    observed = runs.observed
-    named = runs.joint_names, units(runs)
-    amplitudes = observed.episodes[:, :, 2]
-    for joint in np.argsort(-amplitudes.max(axis=0)):
-        if amplitudes[:, joint].any():
-            worst = int(amplitudes[:, joint].argmax())
-            (remark,) = of_steps(*named, {}, {joint: observed.episodes_of(worst)[joint]}, remedy(worst))
-            yield _in_runs(remark, worst, amplitudes[:, joint] > 0)
-    places = {(level.kind, level.row) for level in observed.levels}
-    for kind, row in sorted(places, key=lambda place: (KINDS.index(place[0]), place)):
-        both = [k for k, level in enumerate(observed.levels) if (level.kind, level.row) == (kind, row)]
-        _, duration, _, value = np.moveaxis(observed.visits[:, both], 2, 0)
-        some = ~np.isnan(duration).all(axis=1)
-        if some.any():
-            beyond = np.abs(value - observed.limits[:, both])
-            size = np.nansum(duration, axis=1) if kind is RemarkKind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
-            worst = int(np.nanargmax(np.where(some, size, np.nan)))
-            visits = {x: visit for x, visit in observed.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
-            (remark,) = of_steps(*named, visits, {}, remedy(worst), int(observed.instants[worst]))
-            yield _in_runs(remark, worst, some)
+    for remark, worst, some in of_runs(runs.joint_names, units(runs), runs.observed, remedy):
+        yield _in_runs(remark, worst, some)
 
 
 def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
@@ -163,9 +142,7 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """Yield the remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    for remark in unstable(
-        setup, *states(setup, *samples_of(runs, run)), bool(runs.diverged[run]), end=runs.ends[run].t
-    ):
+    for remark in unstable(setup, *states_of(runs, run, setup), bool(runs.diverged[run]), end=runs.ends[run].t):
         yield replace(remark, runs=(run,), looked=1)
 
 

@@ -16,12 +16,9 @@ from robot_dyn.codegen.threads import shared
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.integrator import PlainMethod
-from robot_dyn.simulation.compiled.cache import machine_code
-from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.dynamics.loop_state import LaneEnd, lanes_of, loop_config, start_position
-from robot_dyn.simulation.observation.observation import NEGLIGIBLE
 from robot_dyn.simulation.rollouts.batch import Batch
-from robot_dyn.simulation.rollouts.lock_step import LANES, starts
+from robot_dyn.simulation.rollouts.lock_step import LANES, lanes_code, starts
 from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.watch import LARGEST
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -42,10 +39,7 @@ class Periods:
 
     def __init__(self, batch: Batch, inputs: str, threads: int) -> None:
         setup = batch.setup
-        build = partial(
-            machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras, swept=tuple(batch.sweep)
-        )
-        code = checked(setup, build)
+        code = lanes_code(batch)
         self._equation, self._count = code.compiled_form, len(batch)
         equation, n = self._equation, code.compiled_form.plant.dynamics.n
         programs = code.code.programs.values()
@@ -60,7 +54,7 @@ class Periods:
         parameters = [code.run_parameters({name: x[row] for name, x in batch.sweep.items()}) for row in numbers]
         self._y, self._parameters = aligned((tiles, equation.size, LANES)), np.array(parameters)
         self._y[...] = np.nan
-        self._alive, self._reason = np.zeros((tiles, LANES), np.int64), np.ones((tiles, LANES), np.int64)
+        self._reason = np.full((tiles, LANES), int(LaneEnd.OVERFLOW))
         swept = [x.name for x in code.inputs if x.name in batch.sweep]
         sizes = [batch.sweep[name].shape[1] for name in swept]
         first = n * equation.sampled + sum(sizes[: swept.index(inputs)])
@@ -75,10 +69,7 @@ class Periods:
             stepper = cast(PlainMethod, setup.method).stepper(FLOAT64, equation.size, n, equation.size | 1, LANES)
             lanes = lanes_of(equation, self._y[0], parameters[0], 0, self._p, np.zeros(LANES, np.uint64))
             empty = np.empty((0, 0, LANES))
-            records = records_of(
-                rows=np.zeros(0, np.int64), y=empty, sampled=empty, shared=np.empty((0, equation.size)),
-                step_log=np.empty((0, equation.size)), columns=np.empty((1 + 3 * n, 0)), observation=NEGLIGIBLE,
-            )  # fmt: skip
+            records = records_of((equation.size, n), np.zeros(0, np.int64), empty, empty)
             config = loop_config(equation, alone=False)._replace(largest=LARGEST)
             position, calls = start_position(inf), []
             for tile in range(tiles):
@@ -86,7 +77,7 @@ class Periods:
                 self._keys[tile, 1] += numbers[tile].astype(np.uint64)
                 runs = lanes._replace(
                     y=self._y[tile], run_parameters=self._parameters[tile],
-                    alive=self._alive[tile], reason=self._reason[tile], keys=self._keys[tile],
+                    reason=self._reason[tile], keys=self._keys[tile],
                 )  # fmt: skip
                 arguments = code.code.addresses, stepper.coefficients, stepper.work
                 loop = Loop(table, runs, records, config, position)
@@ -120,7 +111,6 @@ class Periods:
         lanes = np.flatnonzero(runs[self._numbers])
         tile, column, run = lanes // LANES, lanes % LANES, self._numbers[lanes]
         self._y[tile, :, column] = np.where(ended[run, None], np.nan, y[run])
-        self._alive[tile, column] = ~ended[run]
         self._reason[tile, column] = np.where(ended[run], LaneEnd.OVERFLOW, LaneEnd.RUNNING)
 
     def energies(self) -> np.ndarray:

@@ -19,6 +19,7 @@ from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.formats.save import save_data
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
+from robot_dyn.simulation.results.run_data import taken
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.overview import of_some, overview
@@ -102,13 +103,9 @@ class Rollouts(RolloutsData):
 
     def _some(self, runs: slice) -> Rollouts:
         """Return the runs of a slice, without the `saved` overview of all runs."""
-
-        def of(x: Any) -> Any:
-            if isinstance(x, dict):
-                return {name: values[runs] for name, values in x.items()}
-            return None if x is None else x[runs]
-
-        by_run = {field.name: of(getattr(self, field.name)) for field in fields(self) if field.name not in _SHARED}
+        by_run: dict[str, Any] = {
+            x.name: taken(getattr(self, x.name), runs) for x in fields(self) if x.name not in _SHARED
+        }
         numbers = np.arange(len(self)) if self.numbers is None else self.numbers
         statistics = replace(self.statistics, one_by_one=0, one_by_one_s=0.0)  # counted over the whole batch
         return replace(self, **by_run, statistics=statistics, numbers=numbers[runs], saved=None)

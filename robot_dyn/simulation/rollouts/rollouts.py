@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -29,14 +28,11 @@ from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, Adaptive
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_units
-from robot_dyn.simulation.compiled.cache import machine_code
-from robot_dyn.simulation.compiled.choice import checked
-from robot_dyn.simulation.results.acting import frame_of, rotors_of
-from robot_dyn.simulation.results.provenance import bits_of_machine_code, edits_of_machine_code, joint_types, origin
+from robot_dyn.simulation.results.provenance import joint_types, origin
 from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.comparison import Comparison, differences, drawn
-from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
+from robot_dyn.simulation.rollouts.lock_step import Tiles, lanes_code
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
@@ -196,15 +192,11 @@ def run_batch(
     if why or (not uncut and cut and not setup.samples_on_steps):
         record = one_by_one(batch, threads, on_progress)
     else:
-        build = partial(
-            machine_code, setup.equation, setup.method, lanes=LANES, extras=batch.extras,
-            swept=tuple(batch.sweep), detects=passed is not None and not uncut,
-        )  # fmt: skip
-        record = Tiles(batch, checked(setup, build), None if uncut else passed).run(threads, on_progress)
+        passed_there = None if uncut else passed
+        code = lanes_code(batch, detects=passed_there is not None)
+        record = Tiles(batch, code, passed_there).run(threads, on_progress)
     columns, sources = record.columns, tuple(setup.equation.sources)
     energy, work = columns.get("energy"), columns.get("work")
-    of_code = edits_of_machine_code(setup) | bits_of_machine_code()
-    metadata = frame_of(setup) | rotors_of(setup) | of_code | origin(setup.plant.dynamics)
     return Rollouts(
         joint_names=setup.plant.dynamics.joint_names, t=record.t, q=columns.get("q"), v=columns.get("v"),
         u=columns.get("u"), kinetic=None if energy is None else energy[..., 0],
@@ -212,7 +204,8 @@ def run_batch(
         work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
         ends=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
-        metadata=metadata | setup.metadata, varied=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
+        metadata=origin(setup, compiled=True) | setup.metadata, varied=dict(batch.sweep), setup=record.setup,
+        q0=batch.q0, v0=batch.v0,
         observed=record.observed, numbers=batch.numbers, uncut=passed.names if uncut and passed is not None else (),
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import Annotated, Any, final
 
 import numpy as np
@@ -13,12 +14,13 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.store import NOT_STORED, Layout
 from robot_dyn.foundations.validate import integer
 from robot_dyn.foundations.values import ReadOnly
+from robot_dyn.simulation.diagnostics.runaway import step_too_long
+from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
 from robot_dyn.simulation.rollouts.comparison import Comparison
 from robot_dyn.simulation.rollouts.parameters import parts_of_run
-from robot_dyn.simulation.rollouts.reasons import Samples, reason_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -96,7 +98,7 @@ class RolloutsData(RunData):
             return self.ends[run]
         if run not in self._judged:
             setup = with_values(self.setup, self._of_run(self.setup, run))  # checked before the run
-            self._judged[run] = reason_of(setup, self.ends[run], samples_of(self, run))
+            self._judged[run] = _reason_of(setup, self.ends[run], *states_of(self, run, setup))
         return self._judged[run]
 
     @cached_property
@@ -123,6 +125,21 @@ class RolloutsData(RunData):
         return {"plant": plant, "controller": controller, "q0": self.q0[run], "v0": self.v0[run]}
 
 
-def samples_of(runs: RolloutsData, run: int) -> Samples:
-    """Return times, positions and velocities of one run of a batch."""
-    return runs.t, None if runs.q is None else runs.q[run], None if runs.v is None else runs.v[run]
+def _reason_of(setup: Setup, end: Outcome, t: np.ndarray, y: np.ndarray) -> Outcome:
+    """Return the outcome of a run that diverged, with its step or its loop as the reason if that explains it.
+
+    Only `simulate` searches for a stable period or stable gains, because that takes most of the time.
+    """
+    step_s = end.facts.get("step_s")  # to find it from the setup takes long if there are many ticks
+    step = step_too_long(setup, end.t, None if step_s is None else float(step_s))
+    loop = unstable(setup, t, y, runs_away=True, remedies=False, end=end.t)
+    return explained(end, setup, chain(step, loop))  # the loop is linearised only if the step explains nothing
+
+
+def states_of(runs: RolloutsData, run: int, setup: Setup) -> tuple[np.ndarray, np.ndarray]:
+    """Return times (m,) and states (m, size) of a run; only the start if part of the state was not recorded."""
+    equation = setup.equation
+    if runs.q is None or runs.v is None or equation.equation_of_motion.state_size:
+        return np.zeros(1), equation.start(setup.q0, setup.v0)[None]
+    rest = np.zeros((len(runs.t), equation.size - 2 * len(setup.q0)))
+    return runs.t, np.hstack([runs.q[run], runs.v[run], rest])

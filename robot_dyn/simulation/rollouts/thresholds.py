@@ -15,7 +15,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.detection import LaneEvents, lane_events
+from robot_dyn.simulation.events.detection import LaneEvents
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.setup.schedule import MOST_CUT
 from robot_dyn.simulation.setup.setup import Setup
@@ -51,17 +51,30 @@ class Thresholds:
         return replace(self, levels=self.levels[:, runs], others=self.others[runs])
 
     def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LaneEvents:
-        """Return the switching functions of some of the runs at their start.
+        """Return the switching functions of some of the runs, whose sides, rates and values are not yet evaluated.
 
         Args:
             runs: Numbers of the runs.
             rows: Number of rows of a rate.
             positions: Number of rows that are positions.
         """
-        events = lane_events(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
-        events.until[self.others[runs]] = 0.0
-        events.left[0] -= self.others[runs].sum()
-        return events
+        W, others = len(runs), self.others[runs]
+        rate, next_rate = np.zeros((2, rows if self.coordinates else 0, W))
+        values, next_values, change = np.zeros((3, self.functions, W))
+        return LaneEvents(
+            rows=self.rows,
+            coordinates=self.coordinates,
+            positions=positions,
+            levels=np.array(self.levels[:, runs], order="C"),
+            sides=np.zeros((len(self.rows), W)),
+            rate=rate,
+            next_rate=next_rate,
+            values=values,
+            next_values=next_values,
+            change=change,
+            until=np.where(others, 0.0, np.inf),
+            left=np.array([W - others.sum()]),
+        )
 
 
 def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:

@@ -21,7 +21,7 @@ from robot_dyn.simulation.events.contact_mode import ContactMode, keep_motor_spe
 from robot_dyn.simulation.events.contacts import NO_CONTACT, Contacts, contacts_of
 from robot_dyn.simulation.events.event_log import CHATTER, EventKind, event_log, log_time
 from robot_dyn.simulation.events.event_table import EventTable
-from robot_dyn.simulation.events.mode_change import change_mode
+from robot_dyn.simulation.events.mode_change import change_mode, start_mode
 from robot_dyn.simulation.events.regions import add_region, empty_regions
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.run.event_loop import Events
@@ -42,7 +42,6 @@ class EventHandler:
         state: The state of the run.
         control: Control of the steps; it chooses a new first step if the equation changes.
         degree: Degree of the dense output.
-        thresholds: True to find the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to give up where events accumulate, instead of ending the run.
 
     Attributes:
@@ -52,7 +51,7 @@ class EventHandler:
         error: Error of the rate in the latest trial step that failed, or None.
     """
 
-    def __init__(self, state: RunState, control: StepControl, degree: int, thresholds: bool, may_replace: bool) -> None:
+    def __init__(self, state: RunState, control: StepControl, degree: int, may_replace: bool) -> None:
         self.state, self.control, self.may_replace = state, control, may_replace
         self.error: RobotDynError | None = None
         setup, equation, contacts, brief = state.setup, state.equation, None, _BRIEF * state.setup.duration_s
@@ -60,11 +59,9 @@ class EventHandler:
         if equation.impulses:
             parameters = state.lanes.run_parameters.copy()
             contacts = contacts_of(equation, parameters, state.engine.places(), _MOST_CHANGES, brief)
-            contacts.start(state.start)
-        is_usual = thresholds and contacts is None and not state.payloads.any
+            start_mode(contacts.mode, state.start[:, None].copy())
+        is_usual = contacts is None and not state.payloads.any
         self.switching = cached(setup, switching_of) if is_usual else Switching(equation, contacts=contacts)
-        if not thresholds:
-            self.switching = Switching(equation, self.switching.quantities, contacts)
         if is_usual and not setup.events:
             table, coefficients = copied(cached(setup, start_table_of)), np.zeros(degree + 1)
             self.event_table = table._replace(functions=functions, coefficients=coefficients, stack=work_array(degree))
@@ -162,10 +159,10 @@ class EventHandler:
         state, switching = self.state, self.switching
         if switching.thresholds or switching.dropped or state.payloads.any:
             on_sides = switching.on(self.event_table.sides)
-            functions, state.in_python, parameters, by_numbers = state.engine.evaluated(on_sides, state.watch)
+            functions, state.in_python, parameters = state.engine.evaluated(on_sides, state.watch)
             state.functions = functions._replace(bodies=self._bodies)
             state.set_parameters(parameters)
-            if by_numbers:  # otherwise the functions change, not only their parameters
+            if state.engine.is_compiled:  # otherwise the functions change, not only their parameters
                 add_region(self.regions, switching.of_thresholds(self.event_table.sides), parameters)
         contacts = switching.contacts
         self.events = Events(self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode)

@@ -18,12 +18,14 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions
 from robot_dyn.simulation.engine.interpreted import interpreted, system
 from robot_dyn.simulation.run.outcome import Reason
-from robot_dyn.simulation.run.recording import MOST_SHARED, Path
+from robot_dyn.simulation.run.recording import MOST_SHARED, Path, observe_step
 from robot_dyn.simulation.run.state import RunState
 from robot_dyn.simulation.run.time_loop import WATCHED, changes_torque, time_loop
 from robot_dyn.simulation.run.watch import LARGEST, one_step, overflowed
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced
 from robot_dyn.simulation.setup.setup import Setup
+
+_DOUBTFUL = 1e6  # Σ |y| from which machine code, which does not detect a singular M, leaves a step to Python
 
 
 @final
@@ -48,7 +50,7 @@ class FixedSteps:
         self.loop = state.engine.loop() or time_loop(self.stepper.step)
         every, thin = _shared(setup, pace, len(counts))
         config = state.config._replace(
-            largest=min(state.engine.doubtful, LARGEST),
+            largest=_DOUBTFUL if state.engine.is_compiled else LARGEST,
             every=every,
             thin=thin,
             sample_period=float(setup.record_every_s or 0.0),
@@ -102,18 +104,17 @@ class FixedSteps:
     def _step(self) -> None:
         """Take one step by the interpreted equation."""
         state, s, t, y = self.state, self.state.segment, self.time, self.state.y
-        h, position, observer = float(state.table.lengths[s]), state.position, state.observer
+        h, position = float(state.table.lengths[s]), state.position
         functions, p = interpreted(state.equation, state.watch), state.table.parameters[s]
         if self.method.nonsmooth:
-            y = self._jump(functions, t, h, p)
+            y, latest = self._jump(functions, t, h, p), self.stepper.work.K[-1]
         else:
-            seen = None if observer is None else observer.seen
-            right_side = system(functions, state.equation, p, state.lanes.run_parameters, seen)
+            latest = np.empty((len(y) + state.config.n, 1))
+            right_side = system(functions, state.equation, p, state.lanes.run_parameters, latest)
             y = one_step(self.method, right_side, t, y, h, state.watch)
         state.lanes.y[:, 0] = y
-        if observer is not None:
-            ticked = position.step[0] == 0 and changes_torque(state.config, int(state.table.ticks[s]))
-            observer.step(t, t + h, y, ticked or not state.equation.sampled)
+        acted = position.step[0] == 0 and changes_torque(state.config, int(state.table.ticks[s]))
+        state.observed(lambda: observe_step(state.loop, latest, t, t + h, acted))
         position.step[0] += 1
         position.steps[0] += 1
         if position.steps[0] % WATCHED == 0:

@@ -14,7 +14,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
 from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.loop_state import Functions, Lanes, LoopConfig, Position, erase_ended
-from robot_dyn.simulation.observation.observation import Observation, observe
+from robot_dyn.simulation.observation.observation import UNOBSERVED, Observation, observe
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 
@@ -115,20 +115,39 @@ class Loop(NamedTuple):
 
 
 def records_of(
-    rows: Array, y: Array, sampled: Array, shared: Array, step_log: Array, columns: Array, observation: Observation
+    sizes: tuple[int, int],
+    rows: Array,
+    y: Array,
+    sampled: Array,
+    shared: int = 0,
+    steps: int = 0,
+    columns: Array | None = None,
+    observation: Observation = UNOBSERVED,
 ) -> Records:
-    """Return records in these arrays, with their times; see `Records` for the arguments."""
+    """Return records in these arrays.
+
+    Args:
+        sizes: Entries of a state and number of joints, m and n.
+        rows: See `Records`.
+        y: See `Records`.
+        sampled: See `Records`.
+        shared: Number of states that companion runs share.
+        steps: Number of ends of steps.
+        columns: See `Records`; by default no column.
+        observation: See `Records`; by default no step is observed.
+    """
+    m, n = sizes
     return Records(
         rows=rows,
         t=np.empty(len(y)),
         y=y,
         sampled=sampled,
-        shared_t=np.empty(len(shared)),
-        shared=shared,
-        shared_place=np.empty((len(shared), 2), np.int64),
-        step_log_t=np.empty(len(step_log)),
-        step_log=step_log,
-        columns=columns,
+        shared_t=np.empty(shared),
+        shared=np.empty((shared, m)),
+        shared_place=np.empty((shared, 2), np.int64),
+        step_log_t=np.empty(steps),
+        step_log=np.empty((steps, m)),
+        columns=np.empty((1 + 3 * n, 0)) if columns is None else columns,
         observation=observation,
     )
 

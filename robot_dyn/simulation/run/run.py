@@ -48,7 +48,6 @@ class Run:
         observer: Observer of each step, or None.
         samples: True to record samples; False for a companion run.
         max_evaluations: Number of evaluations of the equation of motion after which the run stops with `TooLong`.
-        thresholds: True to end steps at the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to stop with `Stiff` or `Accumulation` if another method is better suited.
 
     Attributes:
@@ -67,7 +66,6 @@ class Run:
         observer: Observer | None = None,
         samples: bool = True,
         max_evaluations: float = inf,
-        thresholds: bool = True,
         may_replace: bool = False,
     ) -> None:
         self._on_progress, self._activity = on_progress, "simulating" if samples else "estimating the error of"
@@ -87,7 +85,6 @@ class Run:
             ends,
             samples=samples,
             max_evaluations=max_evaluations,
-            thresholds=thresholds,
             may_replace=may_replace,
         )
 
@@ -147,20 +144,15 @@ class Run:
 
         Return why the last call of the loop ended; or `Stiff` if a stiff method should replace the run.
         """
-        observer, position = self.state.observer, self.state.position
+        observer = self.state.observer
         while True:
             if (stiff := self.steps.detect_stiffness()) is not None:
                 return stiff
             steps = min(budget, self.steps.room(budget))
-            if observer is None:
-                position.budget[0] = steps
-                ended = self.steps.advance()
-            else:
-                position.budget[0] = steps = min(steps, observer.room)
-                position.column[0] = observer.filled
-                ended = self.steps.advance()
-                observer.filled = int(position.column[0])
-                observer.process()
+            if observer is not None:
+                steps = min(steps, observer.room)
+            self.state.position.budget[0] = steps
+            ended = self.state.observed(self.steps.advance)
             budget -= steps
             if ended is not Ended.PAUSED or budget <= 0:
                 return ended

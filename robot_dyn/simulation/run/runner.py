@@ -45,14 +45,10 @@ class Runner:
         Raises:
             KeyboardInterrupt: If Ctrl-C stopped the run.
         """
-        report = None if self.on_progress is None else self._report
+        report = None if (on_progress := self.on_progress) is None else lambda _: on_progress(self.end)
         recording = Run(setup, self.engine, pace, on_progress=report, samples=False).record()
         if recording.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         self.evaluations += recording.evaluations
         self.runs += 1
         return recording
-
-    def _report(self, _: float) -> None:
-        assert self.on_progress is not None
-        self.on_progress(self.end)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Callable
+from typing import TypeVar, final
 
 import numpy as np
 
@@ -13,12 +14,14 @@ from robot_dyn.simulation.dynamics.loop_state import LoopConfig, lanes_of, loop_
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.events.payload_events import PayloadEvents
-from robot_dyn.simulation.observation.observation import NEGLIGIBLE
+from robot_dyn.simulation.observation.observation import UNOBSERVED
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.recording import Loop, Records, records_of
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 from robot_dyn.simulation.setup.setup import Setup
+
+T = TypeVar("T")
 
 
 @final
@@ -50,7 +53,7 @@ class RunState:
         self.config = cached(setup, single_run_config)
         n, m = self.config.n, self.equation.size
         self.start = self.equation.start(setup.q0, setup.v0)
-        self.functions, self.in_python, parameters, _ = engine.evaluated(self.equation, self.watch)
+        self.functions, self.in_python, parameters = engine.evaluated(self.equation, self.watch)
         run_parameters = np.concatenate([np.full(self.config.held, np.nan), parameters])[:, None]
         self.lanes = lanes_of(self.equation, self.start[:, None], run_parameters, m + n + 2, table.parameters[0])
         self.lanes.energy[0], self.lanes.scale[0] = self.watch.energy, self.watch.scale
@@ -60,17 +63,21 @@ class RunState:
     def allocate(self, config: LoopConfig, samples: int, shared: int, steps: int) -> None:
         """Set the settings of the loop and allocate its records: rows of samples, shared states and ends of steps."""
         n, m, observer = config.n, self.equation.size, self.observer
-        records = records_of(
-            rows=np.arange(m),
-            y=np.empty((samples, m, 1)),
-            sampled=np.empty((samples, m + n + 2, 1)),
-            shared=np.empty((shared, m)),
-            step_log=np.empty((steps, m)),
-            columns=np.empty((1 + 3 * n, 0)) if observer is None else observer.columns,
-            observation=NEGLIGIBLE if observer is None else observer.observation,
-        )
+        columns, observation = (None, UNOBSERVED) if observer is None else (observer.columns, observer.observation)
+        y, sampled = np.empty((samples, m, 1)), np.empty((samples, m + n + 2, 1))
+        records = records_of((m, n), np.arange(m), y, sampled, shared, steps, columns, observation)
         self.config = config
         self.loop = Loop(self.table, self.lanes, records, config, self.position)
+
+    def observed(self, advance: Callable[[], T]) -> T:
+        """Return the result of a function that may take steps; the observer processes their columns if full."""
+        if self.observer is None:
+            return advance()
+        self.position.column[0] = self.observer.filled
+        result = advance()
+        self.observer.filled = int(self.position.column[0])
+        self.observer.process()
+        return result
 
     @property
     def equation(self) -> StateEquation:
@@ -113,7 +120,7 @@ class RunState:
         s = self.segment
         self.lanes.y[:, 0], happened = self.payloads.over(float(self.table.starts[s]), self.y)
         self.watch.equation = self.payloads.equation
-        self.functions, self.in_python, parameters, _ = self.engine.evaluated(self.equation, self.watch)
+        self.functions, self.in_python, parameters = self.engine.evaluated(self.equation, self.watch)
         self.set_parameters(parameters)
         self.table.payload_events[s] = 0
         return happened

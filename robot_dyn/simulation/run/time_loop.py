@@ -141,7 +141,7 @@ def accept(lanes: Lanes, config: LoopConfig, t: float) -> bool:
         return False
     if doubtful:
         for b in range(len(lanes.size)):
-            if lanes.alive[b] == 1 and (lanes.failed[b] != 0 or not lanes.size[b] < config.largest):
+            if lanes.reason[b] == 0 and (lanes.failed[b] != 0 or not lanes.size[b] < config.largest):
                 end_lane(lanes, b, t, LaneEnd.NO_STAGES if lanes.failed[b] != 0 else LaneEnd.OVERFLOW)
     copy(lanes.y, lanes.after)
     if doubtful:
@@ -168,7 +168,7 @@ def conserves_energy(functions: Functions, loop: Loop, t: float) -> bool:
         for w in range(len(lanes.y) - config.works, len(lanes.y)):
             gained -= lanes.y[w, b]
             moved += abs(lanes.y[w, b])
-        if lanes.alive[b] == 1 and gained > RUNAWAY * moved:
+        if lanes.reason[b] == 0 and gained > RUNAWAY * moved:
             if config.alone:
                 return False
             end_lane(lanes, b, t, LaneEnd.ENERGY_GAIN)
@@ -180,7 +180,7 @@ def conserves_energy(functions: Functions, loop: Loop, t: float) -> bool:
 
 def end_lane(lanes: Lanes, b: int, t: float, reason: int) -> None:
     """End a run in lock step."""
-    lanes.alive[b], lanes.reason[b], lanes.end_time[b] = 0, reason, t
+    lanes.reason[b], lanes.end_time[b] = reason, t
     copy(lanes.end_state[:, b], lanes.y[:, b])
 
 

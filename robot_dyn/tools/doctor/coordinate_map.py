@@ -232,20 +232,21 @@ def _laid(
     basis = Basis.AXES
     if stated is not None:
         candidates = [sign * stated.offset]
-    elif not (candidates := [*_candidates(axis, lines, body.revolute)]):
-        basis = Basis.ASSUMED
-        if body.revolute:
-            candidates = [_snapped(_about(axis, here.R @ there.R.T)), *np.arange(-1, 3) * (pi / 2)]
-    for x in dict.fromkeys(candidates if stated is not None else (*candidates, 0.0)):
+    else:
+        candidates = [*_candidates(axis, lines, body.revolute)]
+        if not candidates:
+            basis = Basis.ASSUMED
+            candidates = [_snapped(_about(axis, here.R @ there.R.T)), *np.arange(-1, 3) * (pi / 2)] * body.revolute
+        candidates.append(0.0)
+    for x in dict.fromkeys(candidates):
         turned = rotation(axis, x) if body.revolute else np.eye(3)
         slid = np.zeros(3) if body.revolute else x * axis
         placed = Pose(turned @ there.R, here.p + turned @ (there.p - here.p) + slid)
-        if stated is not None:  # a sign against the axes turns it by half a turn
-            yield Laid(i, pairs[i], stated, turn if stated.sign == sign else pi - turn, gap, here, placed)
-            continue
         offset = float(sign * x) + 0.0
         offset += 2 * pi if body.revolute and offset <= -pi + 1e-9 else 0.0
-        yield Laid(i, pairs[i], JointMap(body.joint, other.joint, sign, offset, basis), turn, gap, here, placed)
+        own = stated or JointMap(body.joint, other.joint, sign, offset, basis)
+        angle = turn if own.sign == sign else pi - turn
+        yield Laid(i, pairs[i], own, angle, gap, here, placed)
 
 
 def _candidates(axis: np.ndarray, lines: list, revolute: bool) -> Iterator[float]:

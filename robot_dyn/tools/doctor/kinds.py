@@ -48,6 +48,8 @@ class FindingKind(StrEnum):
     """The lower limit exceeds the upper one. Repaired: the order."""
     LIMITS_EQUAL = "limits_equal"
     """The lower limit equals the upper one: the joint cannot move."""
+    SOFT_LIMITS = "soft_limits"
+    """The soft limits of `<safety_controller>` are crossed, or lie outside the limits of the joint."""
     NAME_TWICE = "name_twice"
     """Two links, or two joints, have one name."""
     NAME_BLANKS = "name_blanks"

@@ -1,4 +1,4 @@
-"""Limits of joints: missing, 0, crossed or negative."""
+"""Limits of joints: missing, 0, crossed or negative; soft limits crossed, or outside the limits."""
 
 from __future__ import annotations
 
@@ -67,3 +67,16 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
             f'its limits are both "{limit.get("lower", "0")}", so it cannot move',
             "correct them, or make the joint fixed",
         )  # fmt: skip
+    elif (soft := joint.find("safety_controller")) is not None:
+        low, high = (parsed(soft.get(f"soft_{side}_limit")) for side in ("lower", "upper"))
+        if low > high:
+            yield document.finding(
+                Severity.WARNING, FindingKind.SOFT_LIMITS, joint,
+                f"its soft lower limit {low:g} is above its soft upper limit {high:g}", "exchange them",
+            )  # fmt: skip
+        elif low < lower or high > upper:
+            yield document.finding(
+                Severity.WARNING, FindingKind.SOFT_LIMITS, joint,
+                f"its soft limits {low:g} and {high:g} are not within its limits {lower:g} and {upper:g}",
+                "move them inside: a controller slows the joint down there, before it reaches its limits",
+            )  # fmt: skip

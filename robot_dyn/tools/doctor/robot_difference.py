@@ -118,6 +118,8 @@ class RobotDifference(Answer):
             if row is not None and row.difference
         ]
         what = f"largest differences found {'; '.join(found)}" if found else f"no difference found in {_BOTH}"
+        if not found and self.differences:
+            what += f", but these values differ: {', '.join(dict.fromkeys(x.quantity for x in self.differences))}"
         moved = ", ".join(x.a for x in self.joints if (x.sign, x.offset) != (1, 0.0))
         converted = f"; q is converted at {moved}: another sign or zero position" * bool(moved)
         return f"{a} and {b} {'agree' if self.agrees else 'differ'}: {what}{converted}"
@@ -247,12 +249,10 @@ def diff_robots(
         if not isinstance(values, Mapping | None):
             raise QueryError(f"{label} must be values by joint of a, such as {{'joint_1': …}}, got {shown(values)}")
     names = matched_names(a, b, joints or {})
-    plain = names if truth("same_q", same_q) else ()
-    of_signs, of_offsets = (
-        dict.fromkeys(plain, 1.0) | dict(signs or {}),
-        dict.fromkeys(plain, 0.0) | dict(offsets or {}),
-    )
-    laid, unmapped = laid_bodies(a, b, names, of_signs, of_offsets)
+    signs, offsets = dict(signs or {}), dict(offsets or {})
+    if truth("same_q", same_q):
+        signs, offsets = dict.fromkeys(names, 1.0) | signs, dict.fromkeys(names, 0.0) | offsets
+    laid, unmapped = laid_bodies(a, b, names, signs, offsets)
     maps = tuple(body.map for body in laid)
     largest, order, differences = (), (), [*_of_robot(a, b), *_of_bodies(a, b, laid), *_of_followers(a, b, laid)]
     if not unmapped:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 from pathlib import Path
+from string import Template
 from typing import final
 
 import casadi as ca
@@ -184,7 +185,7 @@ def c_source(
         f"{prefix}_{exported.kind}.h": text.header(renamed),
         f"{prefix}_{exported.kind}.c": text.source(programs),
         f"{prefix}_self_test.c": text.self_test(states),
-        "CMakeLists.txt": _CMAKE.replace("@_dynamics", f"{prefix}_{exported.kind}").replace("@", prefix),
+        "CMakeLists.txt": _filled("CMakeLists.txt.in", library=f"{prefix}_{exported.kind}", name=prefix),
     }
     return CSource(prefix, dtype, functions, math, renamed, files)
 
@@ -274,7 +275,8 @@ class _Text:
         notes = [f"Right angle at full precision: {x}" for x in exported.right_angles]
         notes += [f"Constant of the code: {_value(x, joint_types)}" for x in exported.constants]
         prototypes = "".join(f"\n/* {_DESCRIPTIONS[x.quantity]} */\n{self.prototype(x)};\n" for x in self.functions)
-        return _HEADER.format(
+        return _filled(
+            "header.h.in",
             title=_comment(exported.title),
             guard=f"{upper}_{kind.upper()}_H",
             version=_comment(rd.__version__),
@@ -328,7 +330,8 @@ class _Text:
                 )
             )
         f = "f" if self.dtype == "float32" else ""
-        return _TEST.format(
+        return _filled(
+            "self_test.c.in",
             name=f"{self.prefix}_{self.exported.kind}",
             states=_OF_TEST,
             arrays="\n".join(parts),
@@ -336,6 +339,17 @@ class _Text:
             real=real,
             f=f,
         )
+
+
+class _Template(Template):
+    """Text with names such as @{title}, which neither C nor CMake has."""
+
+    delimiter = "@"
+
+
+def _filled(template: str, **values: object) -> str:
+    """Return the text of a file of this folder with values for its names."""
+    return _Template((Path(__file__).parent / template).read_text(encoding="utf-8")).substitute(values)
 
 
 def _sizes(function: ca.Function) -> tuple[dict[str, int], dict[str, int]]:
@@ -379,35 +393,6 @@ _ERRORS = {
 """,
 }
 
-_HEADER = """\
-/* {title} in {real}, written by robot_dyn {version}.
- *
- * No heap, no static data: functions may run in any thread or interrupt. Results may overlap arguments. Arguments are
- * not checked; they must be finite. Functions of <math.h>: {math}.
- *
-{table}
- *
-{errors} *
-{notes} * Units are SI: q in rad or m, v in rad/s or m/s, a in rad/s^2 or m/s^2, torques in N m or N, t in s.
- */
-#ifndef {guard}
-#define {guard}
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-/* Sizes, and places of entries in q and p; coefficients of joints have one entry for each joint. */
-enum {{
-{constants}
-}};
-{values}{prototypes}
-#ifdef __cplusplus
-}}
-#endif
-
-#endif
-"""
 
 _CALL = """
     worst = 0;
@@ -419,57 +404,3 @@ _CALL = """
     printf("%-18s %.3f of the tolerance\\n", "{name}", (double)worst);
     failed |= !(worst <= 1);
 """.replace("{states}", str(_OF_TEST))
-
-_TEST = """\
-/* Compares {name} with results of an independent implementation at {states} random states. */
-#include "{name}.h"
-
-#include <math.h>
-#include <stdio.h>
-
-{arrays}
-
-static {real} larger({real} worst, const {real} *x, const {real} *expected, const {real} *tolerance, int n)
-{{
-    int i;
-    for (i = 0; i < n; i++) {{
-        const {real} error = fabs{f}(x[i] - expected[i]) / tolerance[i];
-        if (!(error <= worst)) {{
-            worst = error;
-        }}
-    }}
-    return worst;
-}}
-
-int main(void)
-{{
-    {real} worst;
-    int k, failed = 0;
-{calls}
-    printf(failed ? "FAILED\\n" : "passed\\n");
-    return failed;
-}}
-"""
-
-_CMAKE = """\
-cmake_minimum_required(VERSION 3.10)
-project(@_dynamics C)
-
-if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE Release)
-endif()
-add_library(@_dynamics STATIC @_dynamics.c)
-set_target_properties(@_dynamics PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
-target_include_directories(@_dynamics PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-find_library(MATH_LIBRARY m)
-if(MATH_LIBRARY)
-  target_link_libraries(@_dynamics PUBLIC ${MATH_LIBRARY})
-endif()
-
-include(CTest)
-if(BUILD_TESTING)
-  add_executable(@_self_test @_self_test.c)
-  target_link_libraries(@_self_test @_dynamics)
-  add_test(NAME @_self_test COMMAND @_self_test)
-endif()
-"""

@@ -220,8 +220,7 @@ def _refuse_late(found: Estimate) -> None:
 
 def _parameters(model: Model, found: Fit) -> Iterable[Parameter]:
     own = np.concatenate([model.stated, np.full(len(found.names) - len(model.stated), np.nan)])
-    robust = found.quantile * np.sqrt(np.diag(found.robust))
-    for name, *columns in zip(found.names[:-1], found.values, found.half_widths, robust, own, strict=False):
+    for name, *columns in zip(found.names[:-1], found.values, found.half_widths, own, strict=False):
         yield Parameter(name, *map(float, columns))
 
 
@@ -236,7 +235,7 @@ def _determined(
     for k, (name, c) in enumerate(zip(model.base.full_names, np.linalg.lstsq(R.T, unit, rcond=None)[0].T, strict=True)):
         if np.linalg.norm(R.T @ c - unit[k]) < 1e-6:
             width = found.quantile * float(np.sqrt(c @ C @ c))
-            alone.append(Parameter(name, float(bodies[k]), width, np.nan, float(own[k])))
+            alone.append(Parameter(name, float(bodies[k]), width, float(own[k])))
         else:
             blind.append(name)
     return tuple(alone), tuple(blind)

@@ -22,7 +22,6 @@ from robot_dyn.foundations import Value
 LAGS = 3  # rows, in the autocovariance
 LEVEL = 0.95
 _LEAST = 1e-12  # [N m]: least standard deviation of residuals
-_LEVERAGE = 0.5  # largest, of a row, by which its residual is enlarged in the robust covariance [MacKinnon, White 1985]
 
 
 @final
@@ -64,7 +63,6 @@ class Fit(Value):
         names: Names of the parameters, (p,).
         values: Estimates, (p,).
         covariance: Covariance by the autocovariance of the residuals, (p, p).
-        robust: Covariance by blocks of rows, without a model of the residuals, (p, p).
         residuals: τ − Y θ, (m, n).
         used: Rows in the fit, (m, n).
         dof: Degrees of freedom.
@@ -73,7 +71,6 @@ class Fit(Value):
     names: tuple[str, ...]
     values: np.ndarray
     covariance: np.ndarray
-    robust: np.ndarray
     residuals: np.ndarray
     used: np.ndarray
     dof: float
@@ -112,7 +109,7 @@ def fit(rows: Rows, passes: int = 3) -> Fit:
 
     The first pass weights them by the variance of their torques.
     """
-    m, n, p = rows.Y.shape
+    _, n, p = rows.Y.shape
     used = rows.used.astype(float)[..., None]
     Y, Z, tau = rows.Y * used, rows.Z * used, rows.tau * rows.used
     scale = np.sqrt((Y**2).sum(axis=(0, 1)))
@@ -128,22 +125,12 @@ def fit(rows: Rows, passes: int = 3) -> Fit:
     inverse = np.linalg.inv(A)
     Y, Z, e = Y / scale / sigma[:, None], Z / scale / sigma[:, None], residuals * rows.used / sigma
     taken = Y @ inverse  # e = (1 − H) ε with H = taken · Zᵀ
-    leverage = np.clip((taken * Z).sum(axis=2), 0.0, _LEVERAGE)
-    blocks = np.einsum("tip,ti->tp", Z, e / (1 - leverage))
-    B = sum(_taper(k) * blocks[max(k, 0) : m + min(k, 0)].T @ blocks[max(-k, 0) : m + min(-k, 0)]
-            for k in range(-LAGS, LAGS + 1))  # fmt: skip
-    unit = np.outer(1 / scale, 1 / scale)
-    covariance, robust = (inverse @ X @ inverse.T * unit for X in (_parametric(Z, e, taken, rows.used), B))
-    return Fit(rows.names, values, covariance, robust, residuals, rows.used, float(rows.used.sum() - p))
+    covariance = inverse @ _weighted_autocovariance(Z, e, taken, rows.used) @ inverse.T / np.outer(scale, scale)
+    return Fit(rows.names, values, covariance, residuals, rows.used, float(rows.used.sum() - p))
 
 
-def _taper(lag: int) -> float:
-    """Return the weight of a lag (Bartlett)."""
-    return 1 - abs(lag) / (LAGS + 1)
-
-
-def _parametric(Z: np.ndarray, e: np.ndarray, taken: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Return Σ Zᵢᵀ S_ij Z_j with the autocovariance of the errors, tapered over the lags.
+def _weighted_autocovariance(Z: np.ndarray, e: np.ndarray, taken: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Return Σ Zᵢᵀ S_ij Z_j with the autocovariance of the errors, tapered over the lags (Bartlett).
 
     The fit takes part of the errors: of white ones, residuals have the covariance 1 − H. Sums of H over the rows are
     added to those of the residuals, joint by joint and lag by lag.
@@ -154,6 +141,6 @@ def _parametric(Z: np.ndarray, e: np.ndarray, taken: np.ndarray, used: np.ndarra
         a, b = slice(k, m), slice(0, m - k)
         count = used[a].astype(float).T @ used[b].astype(float)
         c = e[a].T @ e[b] + np.tensordot(taken[a], Z[b], ((0, 2), (0, 2)))
-        part = np.einsum("tip,ij,tjr->pr", Z[a], _taper(k) * c / np.maximum(count, 1), Z[b], optimize=True)
+        part = np.einsum("tip,ij,tjr->pr", Z[a], (1 - k / (LAGS + 1)) * c / np.maximum(count, 1), Z[b], optimize=True)
         S += part if k == 0 else part + part.T
     return S

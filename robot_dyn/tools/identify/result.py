@@ -47,14 +47,12 @@ class Parameter:
         name: Joint that carries the body, and parameter; in SI units.
         value: Estimate.
         half_width: Half width of its 95 % interval.
-        robust_half_width: The same without a model of the residuals; nan if it was not computed.
         in_file: Value of the arm's file; nan where it has none.
     """
 
     name: str
     value: float
     half_width: float
-    robust_half_width: float
     in_file: float
 
 
@@ -159,8 +157,8 @@ class Identification(Answer, Value):
         yield ""
         yield from self._verdict()
         yield ""
-        heading = "parameter", "identified", "± 95 %", "± robust", "file"
-        rows = ((p.name, p.value, p.half_width, p.robust_half_width, p.in_file) for p in self.parameters)
+        heading = "parameter", "identified", "± 95 %", "file"
+        rows = ((p.name, p.value, p.half_width, p.in_file) for p in self.parameters)
         yield Table(heading, tuple(rows), digits=4)
         yield f"confounded: {'; '.join(self.confounded)}" if self.confounded else "nothing is confounded"
         yield f"not determined one by one: {', '.join(self.blind)}"

@@ -1,6 +1,6 @@
 """Motors: motions under limits, and whether the motors suffice for them.
 
-    budget               torque, speed, power and headroom of each joint, by cause (MotorBudget)
+    budget               torque by cause, speed, power, bearing loads and headroom of each joint (MotorBudget)
     read_motors          limits of motors from a CSV file (Motors)
     point_to_point       the fastest motion between two states under limits of velocity, acceleration and jerk
     fastest              the path of a motion as fast as the limits of its budget allow

@@ -10,6 +10,3 @@ from robot_dyn.tools.motors.planning.path_at_limits import path as path
 from robot_dyn.tools.motors.planning.path_plan import PathPlan as PathPlan
 
 __all__: list[str]
-
-# Names that only tests import.
-from robot_dyn.tools.motors.torque_speed import TorqueSpeed as TorqueSpeed

@@ -51,15 +51,16 @@ def budget(
 
     Compare the demand on each motor with its limits, by cause. The exit code is 1 if a motor is too small.
     With --fastest it is 1 if a motor is too small for the given motion or for the fastest one.
-    Show torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
+    Show torque and speed peaks, rms torque, power, energy, the torque at which dry friction breaks away, and the loads
+    on the bearings of the joints.
 
     Options:
         source (ROBOT|SCENE.toml|RUN.npz): A robot, with a plan; a scene, which is simulated; or a run file.
-        plan ([PLAN.csv]): Way points or samples: a column t in s, and one for each joint.
+        plan (PLAN.csv): Way points or samples: a column t in s, and one for each joint.
         limits (MOTORS.csv): Motors: joint, peak, continuous, speed, gear_ratio, …, with units; else the
             robot's file.
         max_payload (LINK@X,Y,Z): Find the largest payload there that still fits.
-        fastest: Move along the same path as fast as the limits allow; -o and --csv then write this motion.
+        fastest: Plan the same path as fast as the limits allow; -o and --csv then write its budget.
         fraction: With --fastest: fraction of the peak torques that it may use, up to 1.
         unit: rad or deg, for angles in the plan without a unit in the heading.
         period (SECONDS): Time between rows of a plan without times.

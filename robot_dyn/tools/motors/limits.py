@@ -11,12 +11,20 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, extreme_values
-from robot_dyn.effects import EffortLimit, RigidStops
-from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
+from robot_dyn.effects import EffortLimit, RigidStops, TorqueSpeed
+from robot_dyn.foundations import (
+    EffectError,
+    PlanError,
+    check_coefficients,
+    coefficient,
+    declared,
+    instance,
+    nearest,
+    shown,
+)
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.motors_file import Motors
-from robot_dyn.tools.motors.torque_speed import TorqueSpeed
 
 _SAME_ROTOR = 0.01  # largest relative difference of inertias
 _UNLIKE = 20.0  # factor between the limits of a motor and of the robot's file that suggests the wrong side of a gear
@@ -115,7 +123,7 @@ def limits_of(
     """
     robot: Any = plant.dynamics
     if motors is not None:
-        _check_rotors(motors, robot)
+        _check_joints(motors, robot)
         effort = motors.peak if effort is None else effort
         velocity = (motors.speed or None) if velocity is None else velocity
         continuous = (motors.continuous or None) if continuous is None else continuous
@@ -126,8 +134,8 @@ def limits_of(
     if motors is not None:
         limits = replace(
             limits,
-            brake={name: x for name, x in motors.brake.items() if name in robot.joint_names},
-            bearing={name: x for name, x in motors.bearing.items() if name in robot.joint_names},
+            brake=motors.brake,
+            bearing=motors.bearing,
             gear=_gear(motors, robot),
             line=TorqueSpeed.of_joints(motors.line, robot.joint_names),
             continuous_line=TorqueSpeed.of_joints(motors.continuous_line, robot.joint_names),
@@ -215,8 +223,11 @@ def same_rotor(one: float, other: float) -> bool:
     return abs(one - other) <= _SAME_ROTOR * max(one, other)
 
 
-def _check_rotors(motors: Motors, robot: Any) -> None:
-    """Raise a PlanError if a rotor is not part of the arm: its torque would be missing."""
+def _check_joints(motors: Motors, robot: Any) -> None:
+    """Raise a PlanError if a joint is unknown, or a rotor is not part of the arm: its torque would be missing."""
+    for joint in (*motors.peak, *motors.continuous, *motors.speed, *motors.brake, *motors.bearing):
+        if joint not in robot.joint_names:
+            raise PlanError(f"{motors.source}: no joint {shown(joint)}; {nearest(joint, robot.joint_names)}")
     armatures = dict(zip(robot.joint_names, getattr(robot, "armature", np.zeros(robot.n)), strict=True))
     for joint, inertia in motors.armature.items():
         armature = float(armatures.get(joint, inertia))

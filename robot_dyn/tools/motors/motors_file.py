@@ -22,15 +22,14 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.effects import AT, TorqueSpeedLimit, check_line, check_speed
-from robot_dyn.foundations import PlanError, csv_rows, nearest, shorten
-from robot_dyn.tools.motors.torque_speed import Points
+from robot_dyn.effects import AT, Points, TorqueSpeedLimit, check_line, check_speed
+from robot_dyn.foundations import PlanError, csv_rows, shorten
 
 _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")
 # units of columns with their factors, including units of prismatic joints
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0}
-_FORCE, _MOMENT = {"N": 1.0}, {"N m": 1.0, "Nm": 1.0}
+_FORCE, _MOMENT = {"N": 1.0, "kN": 1e3}, {"N m": 1.0, "Nm": 1.0}
 _SPEED = {"rad/s": 1.0, "m/s": 1.0, "rpm": pi / 30, "deg/s": pi / 180}
 _INERTIA = {"kg m^2": 1.0, "kg m²": 1.0, "kg": 1.0, "kg cm^2": 1e-4, "kg cm²": 1e-4, "g cm^2": 1e-7, "g cm²": 1e-7}
 _UNITS: Mapping[str, Mapping[str, float]] = {
@@ -151,7 +150,10 @@ def _heads(path: str | Path, heads: Sequence[str]) -> dict[str, float]:
         match = _HEAD.fullmatch(head)
         name, unit = (match[1].replace(" ", "_"), match[2] or "") if match else (head, "")
         if name not in _UNITS or name in factors:
-            raise PlanError(f"{path}: column {shorten(head)!r} is unknown or repeated; {nearest(name, _UNITS)}")
+            remedy = f"the columns of motors are {', '.join(_UNITS)}" if name not in _UNITS else "keep one"
+            raise PlanError(
+                f"{path}: column {shorten(head)!r} is {'repeated' if name in factors else 'unknown'}; {remedy}"
+            )
         if unit not in _UNITS[name]:
             listed = "' or '".join(f"{name} [{valid}]" if valid else name for valid in _UNITS[name])
             raise PlanError(f"{path}: column {shorten(head)!r} has no valid unit: write '{listed}'")
@@ -229,7 +231,7 @@ def _check(row: Mapping[str, Any], first: Mapping[str, Any], at: str, *, is_corn
         ),
         (continuous > peak, f"the continuous torque {continuous:.4g} exceeds the peak {peak:.4g}; correct one of them"),
         (
-            0 < peak < inf and not 1 / _BRAKES <= brake / peak <= _BRAKES,
+            row is first and peak < inf and not 1 / _BRAKES <= brake / peak <= _BRAKES,
             f"the brake, {brake:.4g}, and the peak, {peak:.4g}, differ by more than a factor of {_BRAKES:g}; give both"
             f" at the {at}",
         ),

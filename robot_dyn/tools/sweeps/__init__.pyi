@@ -9,10 +9,10 @@ from robot_dyn.tools.sweeps.figures import Run as Run
 from robot_dyn.tools.sweeps.figures import final as final
 from robot_dyn.tools.sweeps.figures import peak as peak
 from robot_dyn.tools.sweeps.figures import rms_tracking_error as rms_tracking_error
+from robot_dyn.tools.sweeps.kept_samples import samples as samples
 from robot_dyn.tools.sweeps.result import SweepResult as SweepResult
 from robot_dyn.tools.sweeps.run_sweep import read_sweep as read_sweep
 from robot_dyn.tools.sweeps.run_sweep import run as run
-from robot_dyn.tools.sweeps.sample_store import samples as samples
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity as Sensitivity
 from robot_dyn.tools.sweeps.statistics import Estimate as Estimate
 from robot_dyn.tools.sweeps.sweep import Sweep as Sweep

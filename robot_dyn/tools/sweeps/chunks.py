@@ -62,9 +62,8 @@ def fill(
         attempts = attempts + 1 if len(left) == before else 0
         if attempts == _ATTEMPTS:
             raise SweepError(
-                f"chunk {left[0]} crashed its worker {_ATTEMPTS} times; to see the cause, run it in this process"
-                f" with the"
-                " same folder and cluster=None"
+                f"chunk {left[0]} crashed its worker {_ATTEMPTS} times; to see the cause, run it in this process with"
+                " the same folder and cluster=None"
             )
 
 

@@ -31,7 +31,6 @@ def sweep(
     seed: int | None = None,
     uncut: bool = False,
     threads: int | None = None,
-    cluster: str | None = None,
     job: str | None = None,
     scene: str | None = None,
     chunk: int | None = None,
@@ -57,7 +56,6 @@ def sweep(
         seed: Seed of the design.
         uncut: Let steps pass thresholds, in lock step; 64 runs are compared with runs whose steps end there.
         threads: Threads of this process; by default one for each processor.
-        cluster: Workers of Dask instead of threads: local:2, or tls://host:8786.
         job (3/16): Number of this job of an array, and number of jobs.
         scene: For a folder: present path of its scene, or the function module:function that returns the setup.
         chunk: Runs in a file; by default about 2 s of work.
@@ -67,7 +65,7 @@ def sweep(
 
     verified: list[str] = []
     figures = arguments.pairs("--figure", figure)
-    options: dict[str, Any] = {"threads": threads, "cluster": cluster, "job": job}
+    options: dict[str, Any] = {"threads": threads, "job": job}
     if scene_or_action.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the output folder with -o FOLDER")

@@ -35,7 +35,11 @@ def inputs_of(folder: Folder, path: str | Path) -> list[Path]:
 
 def _write(sweep: Sweep, folder: Folder, stream: BinaryIO, is_csv: bool) -> None:
     """Write the rows with their units in the headings; texts of a .csv cannot be formulas."""
-    pa, of_files, about = needs("pyarrow", extra="sweeps"), schema(folder.names), _about_columns(sweep)
+    pa, of_files, about = (
+        needs("pyarrow", extra="sweeps"),
+        schema((*sweep.columns, *sweep.figures)),
+        _about_columns(sweep),
+    )
     cell = table_cell if is_csv else str
     fields = [
         field.with_name(cell(heading(sweep, field.name))).with_metadata(about.get(field.name)) for field in of_files

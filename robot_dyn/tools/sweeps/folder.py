@@ -2,9 +2,8 @@
 
 sweep.json                   the specification
 design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
-rows/000123.parquet          a chunk; with more than 20 000 chunks rows/0004/080123.parquet
+rows/000123.parquet          a chunk
 uncut.json                   of an uncut sweep: some of its runs compared with runs whose steps end at thresholds
-samples/                     samples of runs, if they are kept
 
 Files are written completely or not at all. Two writers of one file do no harm: both write the same rows.
 """
@@ -14,13 +13,12 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from time import time
-from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
@@ -28,18 +26,17 @@ from pydantic import TypeAdapter
 
 from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, sync_folder, why
 from robot_dyn.simulation.rollouts.comparison import Comparison
-from robot_dyn.tools.sweeps.imported import NEGLIGIBLE, Named, check_places
-from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
-from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
+from robot_dyn.tools.sweeps.imported import NONE_NAMED, Named, check_places
+from robot_dyn.tools.sweeps.kept_samples import dataset, longest
+from robot_dyn.tools.sweeps.rows import OUTCOMES, SAMPLE_COLUMNS, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
 from robot_dyn.tools.sweeps.sweep import Sweep
-from robot_dyn.tools.sweeps.work import IN_LOCK_STEP, OneByOne
+from robot_dyn.tools.sweeps.work import IN_LOCK_STEP, Facts, OneByOne
 
-MOST_FILES = 20_000  # largest number of files in a folder
 OLD_S = 86_400.0  # age in [s] after which an unfinished file is removed
 UNCUT = "uncut.json"
 _MOST_TABLE, _MOST_COMPARISON = 2**34, 2**20
-_SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
+_FOOTER, _UNFINISHED = b"footer", ".unfinished"
 _REMEDY = "run the sweep again, after removing this file"
 _AGAIN = "run the sweep into this folder again, which writes the file"
 
@@ -54,9 +51,8 @@ class Folder:
         runs: Number of runs, N.
         chunk: Number of runs in a chunk; the last chunk may have fewer.
         digest: SHA-256 of the specification.
-        names: Names of varying parameters and of figures.
+        names: Names of varying parameters, of figures and of columns of samples.
         metadata: Versions and processor, stored in footers.
-        samples: Store of samples of runs; None if samples are not kept.
     """
 
     path: Path
@@ -65,7 +61,6 @@ class Folder:
     digest: str
     names: tuple[str, ...]
     metadata: dict[str, Any] = field(default_factory=dict)
-    samples: SampleStore | None = None
 
     @property
     def count(self) -> int:
@@ -78,52 +73,38 @@ class Folder:
 
     def file(self, chunk: int) -> Path:
         """Return the file of a chunk."""
-        return self._subfolder(chunk) / f"{chunk:06d}{_SUFFIX}"
-
-    def _subfolder(self, chunk: int) -> Path:
-        rows = self.path / "rows"
-        return rows if self.count <= MOST_FILES else rows / f"{chunk // MOST_FILES:04d}"
+        return self._rows / _file_name(chunk)
 
     @property
-    def _subfolders(self) -> list[Path]:
-        return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
+    def _rows(self) -> Path:
+        return self.path / "rows"
 
     def present(self) -> np.ndarray:
         """Return True for chunks with a file, (count,)."""
-        present = np.zeros(self.count, bool)
-        for folder in self._subfolders:
-            try:
-                names = os.listdir(folder)
-            except FileNotFoundError:
-                continue
-            except OSError as error:
-                raise SweepError(
-                    f"{folder}: is not a folder of rows ({why(error)}); remove it, and run again"
-                ) from None
-            for name in names:
-                stem = name.removesuffix(_SUFFIX)
-                if stem.isdigit() and stem != name and int(stem) < self.count:
-                    present[int(stem)] = True
-        return present
+        try:
+            names = set(os.listdir(self._rows))
+        except FileNotFoundError:
+            names = set()
+        except OSError as error:
+            raise SweepError(
+                f"{self._rows}: is not a folder of rows ({why(error)}); remove it, and run again"
+            ) from None
+        return np.array([_file_name(chunk) in names for chunk in range(self.count)])
 
     def missing(self) -> np.ndarray:
         """Return the indices of chunks without a file."""
         return np.flatnonzero(~self.present())
 
     def prepare(self) -> None:
-        """Create the folders, and remove files that killed writers left more than a day ago."""
-        for folder in self._subfolders:
-            make_folder(folder)
-        for path in (path for folder in (self.path, *self._subfolders) for path in folder.glob(f".*{_UNFINISHED}")):
+        """Create the folder of rows, and remove files that killed writers left more than a day ago."""
+        make_folder(self._rows)
+        for path in (*self.path.glob(f".*{_UNFINISHED}"), *self._rows.glob(f".*{_UNFINISHED}")):
             with suppress(OSError):  # removed meanwhile, or owned by another user
                 if time() - path.lstat().st_mtime > OLD_S:
                     path.unlink()
 
-    def write(
-        self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({}),
-        alone: OneByOne = IN_LOCK_STEP,
-    ) -> None:  # fmt: skip
-        """Write a chunk, its samples first; raise a SweepError, with existing files unchanged, if that fails."""
+    def write(self, chunk: int, rows: Rows, facts: Facts) -> None:
+        """Write a chunk; raise a SweepError, with existing files unchanged, if that fails."""
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
         start, stop = self.run_range(chunk)
         footer = {
@@ -132,10 +113,8 @@ class Folder:
             "start": start,
             "stop": stop,
             "rows": digest_of([rows]),
-            "one_by_one": asdict(alone),
-        }
+        } | asdict(facts)
         try:
-            footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
             stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.metadata)})
             table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
             save(
@@ -192,11 +171,16 @@ class Folder:
         """Return the footer of a chunk; for errors, see `read`."""
         return self._read(chunk, [])[1]
 
-    def check_samples(self) -> None:
-        """Raise a SweepError if samples that were written are missing or have changed."""
-        if self.samples is not None:
-            for chunk in range(self.count):
-                self.samples.check(chunk, self.footer(chunk)["samples"])
+    def samples(self, columns: Mapping[str, str], joint_types: Sequence[str | None]) -> Any:
+        """Return the samples in columns, by quantity, as a `xarray.Dataset` of kept runs; for errors, see `read`."""
+        parts: list[Rows] = []
+        t, joints = np.empty(0), ()
+        for chunk in range(self.count):
+            rows, footer = self._read(chunk, list(columns.values()))
+            parts.append(rows)
+            t, joints = longest(t, np.array(footer["t"])), footer["joints"]
+        lists = {name: np.concatenate([part[column] for part in parts]) for name, column in columns.items()}
+        return dataset(lists, t, joints, joint_types)
 
     def columns(self, names: Iterable[str]) -> Rows:
         """Return columns of all rows, (N,); for errors, see `read`."""
@@ -226,16 +210,16 @@ class Folder:
             raise _DamagedError("belongs to another sweep")
         if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, start, stop):
             raise _DamagedError("contains other runs than its name states")
-        if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
-            raise _DamagedError("its footer lacks digests of rows and samples")
-        TypeAdapter(OneByOne).validate_python(footer["one_by_one"])
+        if not isinstance(footer["rows"], str):
+            raise _DamagedError("its footer lacks the digest of its rows")
+        TypeAdapter(Facts).validate_python({name: footer[name] for name in ("one_by_one", "t", "joints")})
         if not file.schema_arrow.equals(schema(self.names)):
             raise _DamagedError("its columns are not those of the sweep")
         if not names:
             return {}, footer
         table = file.read(columns=["run", *names], use_threads=False)
         columns = {name: table[name].to_numpy() for name in table.column_names}
-        if any(table[name].null_count for name in columns):
+        if any(table[name].null_count for name in columns.keys() - SAMPLE_COLUMNS.values()):
             raise _DamagedError("has cells without a value")
         if columns.pop("run").tolist() != list(range(start, stop)):
             raise _DamagedError(f"its rows are not those of runs {start} to {stop - 1}")
@@ -244,8 +228,20 @@ class Folder:
         return {name: x.astype(type_of(name)) for name, x in columns.items()}, footer
 
 
+def _file_name(chunk: int) -> str:
+    return f"{chunk:06d}.parquet"
+
+
 class _DamagedError(Exception):
     """A fault of the file of a chunk."""
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder and its parents; raise a SweepError if that fails."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SweepError(f"{path}: the folder cannot be created ({why(error)}); give another path") from None
 
 
 def read_design(path: Path, digest: str) -> np.ndarray:
@@ -300,8 +296,11 @@ def _design(path: Path, digest: str) -> Path:
     return path / f"design-{digest[:16]}.npy"
 
 
-def opened(path: Path, names: Named = NEGLIGIBLE) -> tuple[Folder, Sweep]:
-    """Return the folder of a sweep, and the sweep; for arguments and errors, see `run_sweep.read`."""
+def opened(path: Path, names: Named = NONE_NAMED, *, runs: bool = False) -> tuple[Folder, Sweep]:
+    """Return the folder of a sweep, and the sweep; for arguments and errors, see `read_sweep`.
+
+    To make runs, the versions of packages must be those of the folder, too.
+    """
     check_places(path)
     stored = stated_in(path)
     try:
@@ -309,12 +308,11 @@ def opened(path: Path, names: Named = NEGLIGIBLE) -> tuple[Folder, Sweep]:
     except SceneError as error:
         remedy = "pass the present path of the scene, sw.read_sweep(folder, scene=…) or --scene"
         raise SweepError(f"{path / FILE}: {error}; {remedy}") from None
-    stored.check_same(specification(sweep, stored.chunk), path, versions=False)
+    stored.check_same(specification(sweep, stored.chunk), path, versions=runs)
     return folder_of(path, sweep, stored), sweep
 
 
 def folder_of(path: Path, sweep: Sweep, stated: Specification) -> Folder:
     """Return the folder of a sweep with the specification in it."""
-    store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
-    names, metadata = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
-    return Folder(path, stated.runs, stated.chunk, stated.digest, names, metadata, store)
+    names = (*sweep.columns, *sweep.figures, *(sweep.samples.columns.values() if sweep.samples else ()))
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, {"versions": versions()} | processor())

@@ -36,7 +36,7 @@ class Named:
     figures: tuple[tuple[str, str], ...] = ()
 
 
-NEGLIGIBLE = Named()
+NONE_NAMED = Named()
 
 
 def named(scene: object, figures: object) -> Named:

@@ -192,19 +192,21 @@ class SweepResult(Answer):
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
         return tuple(runs[order[:count]].tolist())
 
-    def samples(self) -> Any:
-        """Return samples of runs as a lazy `xarray.Dataset` over run, t and joint, nan where a run was not kept.
+    def samples(self, *names: str) -> Any:
+        """Return the samples of the kept runs as a `xarray.Dataset` over run, t and joint, nan after the end of a run.
 
-        Each file is read once, to compare its digest.
+        Args:
+            *names: Some of the kept quantities; by default all.
 
         Raises:
-            SweepError: If the sweep keeps no samples, or a file is missing or was changed.
+            SweepError: If the sweep keeps no samples, or not those of a name, or a file is missing or damaged.
         """
-        if self.folder.samples is None:
+        if self.sweep.samples is None:
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
         self._check_complete()
-        self.folder.check_samples()
-        return self.folder.samples.open(self.sweep.joint_types)
+        kept = self.sweep.samples.columns
+        columns = {choice("samples", name, kept, error=SweepError): kept[name] for name in names or kept}
+        return self.folder.samples(columns, self.sweep.joint_types)
 
     def save(self, path: str | Path, *, force: bool = False) -> Path:
         """Save the results in the format of the suffix of `path`, completely or not at all; return the path.
@@ -302,7 +304,6 @@ class SweepResult(Answer):
             SweepError: If a file is missing, damaged or was changed.
         """
         self._check_complete()
-        self.folder.check_samples()
         return self.folder.digest_of_rows()
 
     @property

@@ -1,4 +1,4 @@
-"""Rows of a sweep's table as columns by name, and the columns that every sweep has.
+"""Rows of a sweep's table as columns by name, the columns that every sweep has, and those of samples.
 
 To add a column, add an entry to `FIXED`: files, `table()`, exports, reports, events, units and `columns` follow.
 """
@@ -63,6 +63,8 @@ FIXED = (
         lambda made: texts_by_run(remarks_on_each(made), len(made)),
     ),
 )  # fmt: skip
+SAMPLE_COLUMNS = {name: f"samples {name}" for name in ("q", "v", "u")}
+"""Columns of lists of samples, by the names of the quantities; see `kept_samples`."""
 TYPES = {column.name: column.type for column in FIXED}
 TEXTS = tuple(column.name for column in FIXED if column.type is not float)
 NUMBERS = tuple(column.name for column in FIXED if column.type is float)
@@ -70,19 +72,20 @@ NUMBERS = tuple(column.name for column in FIXED if column.type is float)
 
 def type_of(name: str) -> DTypeLike:
     """Return the type of a column in memory; varied parameters and figures are float64."""
-    return TYPES.get(name, float)
+    return object if name in SAMPLE_COLUMNS.values() else TYPES.get(name, float)
 
 
 def schema(names: Iterable[str]) -> Any:
-    """Return the schema of the files of rows; `names` are the varying parameters and the figures."""
+    """Return the schema of the files of rows; `names` are varying parameters, figures and columns of samples."""
     pa = needs("pyarrow", extra="sweeps")
-    types = {name: pa.string() if name in TEXTS else pa.float64() for name in (*names, *TYPES)}
-    return pa.schema({"run": pa.int64()} | types)
+    special = dict.fromkeys(TEXTS, pa.string()) | dict.fromkeys(SAMPLE_COLUMNS.values(), pa.list_(pa.float64()))
+    return pa.schema({"run": pa.int64()} | {name: special.get(name, pa.float64()) for name in (*names, *TYPES)})
 
 
-def empty(count: int, varied: Mapping[str, np.ndarray], figures: Iterable[str]) -> Rows:
+def empty(count: int, varied: Mapping[str, np.ndarray], figures: Iterable[str], samples: Iterable[str] = ()) -> Rows:
     """Return rows to be filled; initially they describe runs that raised an error without a reason."""
-    missing = dict.fromkeys(figures, np.nan) | {column.name: column.missing for column in FIXED}
+    missing: dict[str, Any] = dict.fromkeys(figures, np.nan) | dict.fromkeys(samples)
+    missing |= {column.name: column.missing for column in FIXED}
     return {**varied} | {name: np.full(count, value, type_of(name)) for name, value in missing.items()}
 
 
@@ -97,7 +100,9 @@ def digest_of(parts: Iterable[Rows]) -> str:
     for rows in parts:
         for name, x in rows.items():
             digest = digests.setdefault(name, sha256(name.encode()))
-            if name in TEXTS:
+            if name in SAMPLE_COLUMNS.values():
+                digest.update(b"".join(b"-" if y is None else np.append(len(y), y).tobytes() for y in x))
+            elif name in TEXTS:
                 digest.update(b"".join(text.encode() + b"\0" for text in x.tolist()))
             else:
                 digest.update(np.where(np.isnan(x), np.nan, x).tobytes())  # nan has many bit patterns

@@ -14,8 +14,6 @@ from shutil import disk_usage
 from time import perf_counter, process_time
 from typing import Any
 
-import numpy as np
-
 from robot_dyn.codegen import thread_count
 from robot_dyn.foundations import SweepError, check_folder, file_path, function, instance, integer, needs
 from robot_dyn.simulation.rollouts.lock_step import LANES
@@ -30,7 +28,7 @@ from robot_dyn.tools.sweeps.specification import (
     specification,
     stated_in,
 )
-from robot_dyn.tools.sweeps.sweep import Sweep
+from robot_dyn.tools.sweeps.sweep import Sweep, samples_of_run
 from robot_dyn.tools.sweeps.work import Stopped, Work
 
 Progress = Callable[[int, int], object]
@@ -61,7 +59,7 @@ def run(
         sweep: The sweep.
         folder: A new folder, or the folder of the same sweep.
         threads: Number of threads of this process; None for one for each processor.
-        cluster: Workers of Dask.distributed instead of threads: "local:2", the address of a scheduler, or a `Client`.
+        cluster: A `distributed.Client`, whose workers make the runs instead of threads.
         job: Part of the chunks, for example "3/16" in the third of 16 jobs.
         chunk: Number of runs in a file; None for about 2 s of work, by a pilot of 64 runs. Constant for a folder.
         on_progress: Function of the number of finished runs, and of all runs; None for a progress bar if stderr is a
@@ -77,14 +75,18 @@ def run(
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
     path, (number, jobs), work = file_path(folder, SweepError), share_of(job), Work(sweep)
     count = thread_count(threads)
-    if cluster is not None and (job is not None or threads is not None):
-        raise SweepError("cluster: its scheduler distributes the chunks; remove job and threads")
+    if cluster is not None:
+        client = needs("distributed", extra="cluster").Client
+        remedy = "give a distributed.Client, such as Client('tls://host:8786')"
+        instance("cluster", cluster, client, remedy, error=SweepError)
+        if job is not None or threads is not None:
+            raise SweepError("cluster: its scheduler distributes the chunks; remove job and threads")
     check_places(path)
     check_folder(path, SweepError)
     _ = sweep.setup, work.record  # raises if a folder names functions that its reader has not named
     store = begun(sweep, path, chunk)
     store.prepare()
-    t, last = None if store.samples is None else store.samples.times(), 0.0
+    last = 0.0
 
     def report_progress() -> None:
         nonlocal last
@@ -98,16 +100,15 @@ def run(
 
     def make(number: int, look: Callable[[float], object]) -> None:
         if not store.file(number).exists():  # another driver was first
-            store.write(number, *work.run_rows(*store.run_range(number), t, look))
+            store.write(number, *work.run_rows(*store.run_range(number), look))
 
     with suppress(KeyboardInterrupt):
         if cluster is None:
             fill_by_threads(make, missing, count, report_progress)
         else:
-            from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
+            from robot_dyn.tools.sweeps.cluster import fill_by_cluster
 
-            with client_of(cluster) as client:
-                fill_by_cluster(client, store, names_of(sweep), missing, report_progress)
+            fill_by_cluster(cluster, store, names_of(sweep), missing, report_progress)
         if sweep.uncut and not len(store.missing()) and not (path / UNCUT).exists():
             with suppress(Stopped):
                 store.write_comparison(work.compared())
@@ -164,11 +165,10 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
-    stated, t = specification(sweep, chunk or 1), None
+    stated = specification(sweep, chunk or 1)
     if not (path / FILE).is_file():
         _check_room(sweep, path)
         stated = stated.model_copy(update={"chunk": pilot(sweep, chunk)})
-        t = None if sweep.samples is None else _times(sweep)  # raises before the folder contains an invalid sweep
         begin(path, stated, sweep.points.rows)
     stored = stated_in(path)  # written by another driver, if that was first
     stored.check_same(stated.model_copy(update={"chunk": chunk or stored.chunk}), path)
@@ -176,16 +176,7 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
         read_design(path, stored.rows_sha256)
     except SweepError:
         write_design(path, sweep.points.rows, stored.rows_sha256)
-    folder = folder_of(path, sweep, stored)
-    if folder.samples is not None and not folder.present().any():
-        folder.samples.create(_times(sweep) if t is None else t, sweep.setup.plant.dynamics.joint_names)
-    return folder
-
-
-def _times(sweep: Sweep) -> np.ndarray:
-    """Return the times of the samples, (m,), in [s]; raise an error if samples cannot be kept."""
-    needs("zarr", extra="sweeps")
-    return Work(sweep).times()
+    return folder_of(path, sweep, stored)
 
 
 def _check_room(sweep: Sweep, path: Path) -> None:
@@ -229,6 +220,6 @@ def _pilot(work: Work, sweep: Sweep, chunk: int | None) -> int:
     runs = _CHUNK_S * count / max(process_time() - began, 1e-9)
     most = min(_MOST, max(LANES, -(-sweep.runs // _LEAST_CHUNKS)))
     if sweep.samples is not None:
-        size = 8 * len(work.times()) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
+        size = 8 * samples_of_run(sweep.setup) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
         most = min(most, _SAMPLE_BYTES // size // LANES * LANES)
     return LANES * max(1, round(min(runs, most) / LANES))

@@ -22,12 +22,12 @@ from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions, figures
 from robot_dyn.tools.sweeps.designs import MOST_ROWS
 from robot_dyn.tools.sweeps.figures import UserFigure
-from robot_dyn.tools.sweeps.imported import NEGLIGIBLE, Named, check_named, digest_of, is_scene
-from robot_dyn.tools.sweeps.sample_store import Samples
+from robot_dyn.tools.sweeps.imported import NONE_NAMED, Named, check_named, digest_of, is_scene
+from robot_dyn.tools.sweeps.kept_samples import Samples
 from robot_dyn.tools.sweeps.sweep import Sweep
 
 FILE = "sweep.json"
-FORMAT = 6
+FORMAT = 7
 _MOST_BYTES = 2**26
 _NONE = "start a sweep with robot-dyn sweep SCENE.toml … -o FOLDER"
 _PLACE = "scene"  # its path may differ
@@ -61,7 +61,7 @@ class Specification(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    format: Literal[6]
+    format: Literal[7]
     scene: str
     setup: dict[str, Any]
     runs: Annotated[int, Field(gt=0, le=MOST_ROWS)]
@@ -101,7 +101,7 @@ class Specification(BaseModel):
                     " give another folder, or the same sweep"
                 )
 
-    def sweep(self, rows: np.ndarray, folder: Path, named: Named = NEGLIGIBLE) -> Sweep:
+    def sweep(self, rows: np.ndarray, folder: Path, named: Named = NONE_NAMED) -> Sweep:
         """Return the sweep, with the present content of its scene.
 
         Functions in the specification are imported only if `named` has them, too.

@@ -17,11 +17,11 @@ from robot_dyn.tools.sweeps.designs import Design, design, from_table
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.figures import Figure, UserFigure, figure
 from robot_dyn.tools.sweeps.imported import by_name, imported, is_import_path, is_scene, source_of
-from robot_dyn.tools.sweeps.rows import FIXED, NUMBERS, OUTCOMES, TEXTS
-from robot_dyn.tools.sweeps.sample_store import Samples, samples_of
+from robot_dyn.tools.sweeps.kept_samples import Samples, samples_of
+from robot_dyn.tools.sweeps.rows import FIXED, NUMBERS, OUTCOMES, SAMPLE_COLUMNS, TEXTS
 
 STARTS = ("q0", "v0")
-RESERVED = ("run", *NUMBERS, *TEXTS, "failed", *OUTCOMES)
+RESERVED = ("run", *NUMBERS, *TEXTS, "failed", *OUTCOMES, *SAMPLE_COLUMNS.values())
 
 
 @final

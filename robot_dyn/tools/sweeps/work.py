@@ -19,6 +19,7 @@ from robot_dyn.simulation.rollouts.comparison import Comparison, differences, dr
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.simulation.rollouts.rollouts import batch_of, run_batch, stepping_groups
 from robot_dyn.tools.sweeps.figures import Runs
+from robot_dyn.tools.sweeps.kept_samples import longest, until_end
 from robot_dyn.tools.sweeps.rows import FIXED, RAISED, Rows, empty, joined
 from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
 
@@ -47,6 +48,22 @@ class OneByOne:
 
 
 IN_LOCK_STEP = OneByOne(0, 0.0, 0.0)
+
+
+@final
+@dataclass(frozen=True)
+class Facts:
+    """Facts about the runs of a chunk, for the footer of its file.
+
+    Attributes:
+        one_by_one: Runs simulated one by one.
+        t: Times of the samples, in [s]; empty if none are kept.
+        joints: Names of the joints of the samples; empty if none are kept.
+    """
+
+    one_by_one: OneByOne
+    t: tuple[float, ...] = ()
+    joints: tuple[str, ...] = ()
 
 
 class Stopped(Exception):  # noqa: N818  not an error
@@ -87,7 +104,7 @@ class Work:
 
     def rows(self, start: int, stop: int) -> Rows:
         """Return the rows of runs start, …, stop − 1."""
-        return self.run_rows(start, stop, None)[0]
+        return self.run_rows(start, stop)[0]
 
     def compared(self) -> Comparison:
         """Make some runs, drawn at random, uncut and with steps that end at thresholds, and compare their figures."""
@@ -99,66 +116,53 @@ class Work:
         figures = {name: uncut[name] for name in sweep.figures}
         return Comparison(len(runs), sweep.runs, others, tuple(differences(figures, cut, sweep.units)))
 
-    def run_rows(
-        self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None
-    ) -> tuple[Rows, dict[str, np.ndarray], OneByOne]:
+    def run_rows(self, start: int, stop: int, look: Look | None = None) -> tuple[Rows, Facts]:
         """Make runs.
 
         Args:
             start: The first run.
             stop: The run after the last.
-            t: Times of samples, (m,), in [s]; None if samples are not kept.
             look: Function called about ten times a second; it ends the work by raising.
 
         Returns:
-            The rows of the runs, their samples by name, (k, m, n), nan where not kept, and the runs made one by one.
-        """
-        selection, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
-        samples, parts, alone = dict[str, np.ndarray](), list[Rows](), IN_LOCK_STEP
-        if selection is not None and t is not None:
-            samples = {name: np.full((stop - start, len(t), n), np.nan) for name in selection.names}
+            The rows of the runs, and facts about them.
 
-        def use(runs: np.ndarray, result: Rollouts) -> None:
-            nonlocal alone
+        Raises:
+            SweepError: If samples are kept, and the runs are not sampled at the same times.
+        """
+        parts, alone, t = list[Rows](), IN_LOCK_STEP, np.empty(0)
+
+        def use(result: Rollouts) -> None:
+            nonlocal alone, t
             ran = result.statistics
             alone += OneByOne(ran.one_by_one, ran.one_by_one_s, ran.wall_s)
-            if selection is not None and t is not None:
-                selected = selection.selected(runs, result.diverged)
-                _check_times(result.t, t)
-                for name, x in samples.items():
-                    x[runs[selected] - start, : len(result.t)] = getattr(result, name)[selected]
+            t = t if self.sweep.samples is None else longest(t, result.t)
 
         for first in range(start, stop, self.part):
             last = min(first + self.part, stop)
             parts.append(self._rows(np.arange(first, last), self.sweep.values(first, last), look, use))
-        return joined(parts), samples, alone
+        joints = () if self.sweep.samples is None else self.sweep.setup.plant.dynamics.joint_names
+        return joined(parts), Facts(alone, tuple(t.tolist()), joints)
 
     def _rows(
         self,
         runs: np.ndarray,
         values: dict[str, np.ndarray],
         look: Look | None = None,
-        use: Callable[[np.ndarray, Rollouts], object] = lambda runs, result: None,
+        use: Callable[[Rollouts], object] = lambda result: None,
     ) -> Rows:
         """Return the rows of runs with these numbers, in order, and call `use` with the rollouts of some of them."""
         columns = np.column_stack(list(values.values())).T
-        rows = empty(len(runs), dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures)
+        samples = self.sweep.samples.columns.values() if self.sweep.samples else ()
+        rows = empty(len(runs), dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures, samples)
         for some, result in self._results(runs, values, look):
             places = np.searchsorted(runs, some)
             if isinstance(result, str):
                 rows["why"][places] = result
             else:
-                self._write(rows, places, result)
-                use(some, result)
+                self._write(rows, places, some, result)
+                use(result)
         return rows
-
-    def times(self) -> np.ndarray:
-        """Return the times of samples, (m,), in [s], from the first of 64 runs that finishes."""
-        count = min(64, self.sweep.runs)
-        for _, result in self._results(np.arange(count), self.sweep.values(0, count)):
-            if not isinstance(result, str) and not result.diverged.all():
-                return result.t
-        raise SweepError(f"samples: none of the first {count} runs finishes, so their times are unknown")
 
     def setup_of(self, i: int) -> Setup:
         """Return the setup of run i; raise a SweepError with the reason if it is invalid."""
@@ -178,10 +182,14 @@ class Work:
         ((_, passed),) = stepping_groups(batch)
         return run_batch(batch, passed, self.uncut, 1, MOST_BYTES)[0]
 
-    def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
-        """Write the results of runs into rows, with figures for runs that finished."""
+    def _write(self, rows: Rows, at: np.ndarray, numbers: np.ndarray, result: Rollouts) -> None:
+        """Write the results of runs with their numbers into rows, with figures for runs that finished."""
         for column in FIXED:
             rows[column.name][at] = column.values(result)
+        if (selection := self.sweep.samples) is not None:
+            for i in np.flatnonzero(selection.selected(numbers, result.diverged)):
+                for name, column in selection.columns.items():
+                    rows[column][at[i]] = until_end(getattr(result, name)[i])
         places = np.flatnonzero(~result.diverged)
         if not len(places):
             return
@@ -254,9 +262,3 @@ def _in_halves(places: np.ndarray, attempt: Callable[[np.ndarray], Any]) -> Iter
             yield from _in_halves(places[half:], attempt)
         return
     yield places, result
-
-
-def _check_times(t: np.ndarray, known: np.ndarray) -> None:
-    """Raise a SweepError unless the times of a batch are the first times of all runs."""
-    if len(t) > len(known) or (t != known[: len(t)]).any():
-        raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_every_s")

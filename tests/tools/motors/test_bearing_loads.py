@@ -104,7 +104,8 @@ def test_loads_of_a_motion_are_those_of_an_independent_newton_euler(name: str, e
             # times are rounded to 1e-12 s, in which a load of 200 N changes by 1e-9 N
             assert expected(at)[i, k] == pytest.approx(largest[i, k], rel=ROUNDING, abs=1e-11 * size)
     dense = np.array([expected(t) for t in np.linspace(0.0, 1.3, 20)])
-    assert (dense.max(axis=0) <= largest + ROUNDING * size).all()
+    # refined to 2e-5 of a node spacing of 6e-4 s: a maximum between is missed by less than 1e-8 of it
+    assert (dense.max(axis=0) <= largest + 1e-8 * size).all()
 
 
 def chain(turned: float) -> rd.Robot:
@@ -183,8 +184,8 @@ def files(tmp_path: Path) -> Path:
     rows = ("0," + ",".join(map(str, POSTURE)), "1," + ",".join(map(str, POSTURE + 0.2)))
     (tmp_path / "plan.csv").write_text("\n".join([heads, *rows]) + "\n")
     (tmp_path / "motors.csv").write_text(
-        "joint,at,gear_ratio,peak [N m],bearing axial [N],bearing radial [N],bearing tilting [Nm]\n"
-        "shoulder_pan_joint,motor,100,3,150,,\nshoulder_lift_joint,joint,,300,,900,500\n"
+        "joint,at,gear_ratio,peak [N m],bearing axial [N],bearing radial [kN],bearing tilting [Nm]\n"
+        "shoulder_pan_joint,motor,100,3,150,,\nshoulder_lift_joint,joint,,300,,0.9,500\n"
     )
     return tmp_path
 
@@ -224,7 +225,7 @@ def test_the_page_of_a_budget_has_the_loads_on_bearings_and_their_limits(files: 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("joint,peak [N m],bearing axial [kN]\na,1,2\n", "bearing_axial \\[N\\]"),
+        ("joint,peak [N m],bearing axial [lbf]\na,1,2\n", "bearing_axial \\[N\\]"),
         ("joint,peak [N m],bearing force [N]\na,1,2\n", "bearing force"),
         ("joint,peak [N m],bearing axial [N]\na,1,0\n", "bearing_axial must be a positive number, got 0"),
         ("joint,peak [N m],speed [rad/s],bearing radial [N]\na,2,1,5\na,0,3,6\n", "has another bearing_radial"),

@@ -90,3 +90,10 @@ def test_limits_on_the_wrong_side_of_a_gear_are_findings(tmp_path: Path) -> None
         motors = rd.tools.motors.read_motors(_file(tmp_path, text))
         findings = rd.tools.motors.budget(plan, arm, motors=motors).findings
         assert len([finding for finding in findings if "gear_ratio" in finding]) == expected
+
+
+@pytest.mark.parametrize("column", ["continuous [N m]", "brake [N m]", "speed [rad/s]"])
+def test_an_unknown_joint_of_a_file_is_refused_with_the_file(tmp_path: Path, column: str) -> None:
+    motors = rd.tools.motors.read_motors(_file(tmp_path, f"joint,peak [N m],{column}\nelbow,5,3\n"))
+    with pytest.raises(rd.RobotDynError, match=r"motors\.csv: no joint 'elbow'"):
+        rd.tools.motors.budget(rd.control.quintic(np.zeros(6), np.ones(6), 3.0), rd.load("ur5"), motors=motors)

@@ -225,6 +225,31 @@ def test_a_path_that_cannot_be_planned_says_why(name: str, points: list[list[flo
         rd.tools.motors.path(rd.load(name), np.array(points), **options)
 
 
+def test_a_spline_outside_the_limits_between_points_inside_is_refused_or_a_finding() -> None:
+    """The points are at the limit of a joint and its neighbour moves on: a spline passes the limit between them."""
+    arm = _arm("panda")
+    points = np.tile((arm.lower + arm.upper) / 2, (4, 1)) + 0.2 * np.arange(4.0)[:, None] * (np.arange(7) == 0)
+    points[1:3, 1] = arm.upper[1] - 1e-3
+    assert ((points >= arm.lower) & (points <= arm.upper)).all()
+    with pytest.raises(PlanError, match=r"panda_joint2 is at .* outside its limits"):
+        rd.tools.motors.path(arm, points)
+    spline = rd.control.via_points([0.0, 1.0, 2.0, 3.0], points)
+    assert sum("outside its limits" in finding for finding in rd.tools.motors.budget(spline, arm).findings) == 1
+
+
+@toppra
+def test_a_path_near_the_edge_of_the_workspace_is_within_limits_between_the_times_of_its_check() -> None:
+    """An elbow within 0.03 rad of straight, at 50 001 times; the check itself allows 1.001 at 10 000 times."""
+    arm = _arm("panda")
+    points = _way_points(arm, seed=3)
+    points[:, 3] = -0.12 + 0.03 * np.array([0.0, 1.0, -1.0, 0.5, -0.5])
+    plan = rd.tools.motors.path(arm, points)
+    q, v, a = plan.reference.at(np.linspace(0, plan.duration_s, 50_001))
+    assert np.abs(v / arm.velocity_limit).max() <= 1.001
+    assert np.abs(arm.inverse_dynamics(q, v, a) / arm.effort_limit).max() <= 1.001
+    assert ((q >= arm.lower) & (q <= arm.upper)).all()
+
+
 @pytest.mark.parametrize("package", ["toppra", "ruckig"])
 def test_without_its_extra_a_motion_says_the_line_that_installs_it(package: str, monkeypatch) -> None:
     for name in [name for name in sys.modules if name.startswith("toppra.")]:

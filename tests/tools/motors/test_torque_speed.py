@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.effects import TorqueSpeed
 from robot_dyn.foundations import PlanError
 from robot_dyn.simulation import RemarkKind
-from robot_dyn.tools.motors import TorqueSpeed
 from tests.effects.test_effect_states import MASS, SLIDER
 
 ARM = rd.load("planar_2r")

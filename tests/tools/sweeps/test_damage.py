@@ -20,12 +20,12 @@ from tests.long import long
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import digest, swept
 
-for _module in ("zarr", "xarray"):
+for _module in ("xarray",):
     pytest.importorskip(_module)
 pa = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 Damage = Callable[[Path], object]
-ROWS, SHARD = "rows/000001.parquet", "samples/q/c/1/0/0"
+ROWS = "rows/000001.parquet"
 AGAIN = "; run the sweep again"
 
 
@@ -139,8 +139,9 @@ CHUNK: dict[str, Damage] = {
 BY_HAND: dict[str, Damage] = {
     "no digest of rows": footer(rows=None),
     "digest of a number": footer(rows=3),
-    "no digests of samples": footer(samples=None),
-    "a list of digests": footer(samples=[]),
+    "no times of samples": footer(t=None),
+    "times of samples in words": footer(t=["soon"]),
+    "no joints": footer(joints=None),
     "no times": footer(one_by_one=None),
     "times of another kind": footer(one_by_one={"runs": "many", "runs_s": 0.0, "all_s": 1.0}),
     "no reason": cell("reason", None),
@@ -148,16 +149,6 @@ BY_HAND: dict[str, Damage] = {
     "another outcome": cell("outcome", "finishedX"),
     "no figure": cell("error", None),
     "another run": cell("run", 7),
-}
-SAMPLES: dict[str, Damage] = {
-    "no samples": gone("samples"),
-    "no shard": gone(SHARD),
-    "no array": gone("samples/q/zarr.json"),
-    "group": text("samples/zarr.json", "{"),
-    "times": text("samples/t/zarr.json", "{"),
-    "array": text("samples/q/zarr.json", "{}"),
-    "empty shard": text(SHARD, ""),
-    "one bit of a shard": bytes_of(SHARD, lambda data: flipped(data, 1000)),
 }
 DESIGN: dict[str, Damage] = {
     "gone": gone("design-*"),
@@ -197,28 +188,21 @@ def test_a_damaged_chunk_is_made_again_once_it_is_removed(copy: Path, whole: sw.
     assert sw.run(whole.sweep, copy).verify() == digest(whole.sweep)
 
 
-@pytest.mark.parametrize("found", [5, 7])
+@pytest.mark.parametrize("found", [5, 8])
 def test_a_folder_of_another_format_is_refused_with_both(copy: Path, found: int) -> None:
     key("format", found)(copy)
-    with pytest.raises(SweepError, match=f"has format {found}, but this version reads 6; read it with the version"):
+    with pytest.raises(SweepError, match=f"has format {found}, but this version reads 7; read it with the version"):
         sw.read_sweep(copy)
 
 
-RESUMED = ("empty", "binary", "a list", "a folder", "runs of text", "chunk 0", "times", "no samples")
+RESUMED = ("empty", "binary", "a list", "a folder", "runs of text", "chunk 0")
 
 
 @pytest.mark.parametrize("name", RESUMED)
 def test_a_damaged_folder_is_not_resumed(copy: Path, whole: sw.SweepResult, name: str) -> None:
-    (SPECIFICATION | SAMPLES)[name](copy)
+    SPECIFICATION[name](copy)
     with pytest.raises(RobotDynError):
         sw.run(whole.sweep, copy)
-
-
-@pytest.mark.parametrize("name", SAMPLES)
-def test_damaged_samples_are_refused(copy: Path, name: str) -> None:
-    SAMPLES[name](copy)
-    with pytest.raises(RobotDynError):
-        sw.read_sweep(copy).samples().q.values  # noqa: B018
 
 
 @pytest.mark.parametrize("name", DESIGN)
@@ -234,7 +218,7 @@ def test_a_damaged_design_is_refused_until_the_sweep_is_run_again(copy: Path, wh
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes have paths on POSIX alone")
 def test_a_pipe_is_refused_at_once(copy: Path) -> None:
-    for name, question in (("samples/q/zarr.json", lambda done: done.samples()), ("sweep.json", None)):
+    for name, question in ((ROWS, lambda done: done.samples()), ("sweep.json", None)):
         replaced(name, os.mkfifo)(copy)
         with pytest.raises(RobotDynError), limited(6):
             done = sw.read_sweep(copy)
@@ -245,8 +229,8 @@ def test_a_pipe_is_refused_at_once(copy: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "question"),
     [
-        (SHARD, "samples().q.values"),
-        *long([("design-*", "table()"), (ROWS, "table()"), ("samples/t/zarr.json", "samples().q.values")]),
+        (ROWS, "samples().q.values"),
+        *long([("design-*", "table()"), (ROWS, "table()")]),
     ],
 )
 def test_zeros_without_end_are_refused_at_once(copy: Path, whole: sw.SweepResult, name: str, question: str) -> None:

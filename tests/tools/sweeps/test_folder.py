@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,7 +15,7 @@ from robot_dyn.foundations import MissingExtraError, SweepError
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work, begun, run_sweep
-from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
+from robot_dyn.tools.sweeps.folder import begin
 from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
 from robot_dyn.tools.sweeps.specification import specification
 from robot_dyn.tools.sweeps.work import Stopped
@@ -34,7 +33,7 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     folder = begun(sweep, tmp_path / "out", chunk=20)
     folder.prepare()
     work = Work(sweep)
-    folder.write(0, work.rows(0, 20))
+    folder.write(0, *work.run_rows(0, 20))
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -44,22 +43,10 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     )
     with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
         patch.setattr(os, "fsync", full)
-        folder.write(3, work.rows(60, 80))
+        folder.write(3, *work.run_rows(60, 80))
     assert folder.missing().tolist() == [1, 2, 3, 4]
     done = sw.run(sweep, tmp_path / "out")
     assert done.verify() == digest(sweep)
-
-
-def test_samples_whose_folder_cannot_be_made_are_refused_with_the_chunk(tmp_path: Path) -> None:
-    pytest.importorskip("zarr")
-    sweep = swept(tmp_path, 40, samples="q")
-    folder = begun(sweep, tmp_path / "out", chunk=20)
-    assert folder.samples is not None
-    folder.prepare()
-    (folder.samples.path / "q" / "c").write_text("")
-    with pytest.raises(SweepError, match=r"^chunk 1 \(runs 20 to 39\): "):
-        folder.write(1, *Work(sweep).run_rows(20, 40, folder.samples.times()))
-    assert folder.missing().tolist() == [0, 1]
 
 
 def test_the_name_of_a_specification_is_on_the_disk_before_the_sweep_begins(tmp_path: Path, monkeypatch) -> None:
@@ -165,20 +152,6 @@ def test_a_folder_of_other_files_is_refused(tmp_path: Path) -> None:
     (tmp_path / "full" / "thesis.tex").write_text("")
     with pytest.raises(SweepError, match=r"contains other files, such as thesis\.tex"):
         sw.run(swept(tmp_path, 50), tmp_path / "full")
-
-
-def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
-    folder = begun(swept(tmp_path, 10), tmp_path / "out", chunk=5)
-    many = replace(folder, runs=5 * 2 * MOST_FILES + 1)
-    assert isinstance(many, Folder) and many.count == 2 * MOST_FILES + 1
-    names = [many.file(chunk) for chunk in range(many.count)]
-    assert len(set(names)) == many.count
-    folders = [path.parent for path in names]
-    assert max(folders.count(each) for each in set(folders)) == MOST_FILES
-    many.prepare()
-    for chunk in (0, MOST_FILES, many.count - 1):
-        many.file(chunk).write_bytes(b"")
-    assert np.flatnonzero(many.present()).tolist() == [0, MOST_FILES, many.count - 1]
 
 
 def test_a_driver_that_was_second_takes_the_specification_of_the_first(tmp_path: Path, monkeypatch) -> None:

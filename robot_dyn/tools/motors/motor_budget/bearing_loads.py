@@ -96,7 +96,8 @@ def of_plan(grid: Cells, plant: Plant, limits: Limits) -> Bearings:
     robot: Any = plant.dynamics
     acting = [effect.name for effect in (*plant.forces, *plant.equation_of_motion.payloads)]
     if unknown := [name for name in acting if name not in KNOWN_ON_LINKS]:
-        return _unknown(f"the forces of the effect {unknown[0]} on the links are unknown", limits)
+        remedy = "pass them to arm.joint_wrenches(q, v, a, external=…)"
+        return _unknown(f"the forces of the effect {unknown[0]} on the links are unknown; {remedy}", limits)
 
     def loads(cell: np.ndarray, x: np.ndarray) -> np.ndarray:
         t, q, v, a = grid.states(cell, x)

@@ -77,7 +77,7 @@ class MotorBudget(Result):
         if not share:
             return "no limits are known, so the motors cannot be checked"
         verdict = "the motors suffice" if not self._unknown else "the motors suffice where limits are known"
-        return f"{verdict}; {nearest.joint} is nearest to its {KINDS[kind]}, {nearest.says(kind)} ({share:.0%})"
+        return f"{verdict}; the largest use is {share:.0%}: {KINDS[kind]} of {nearest.joint}, {nearest.says(kind)}"
 
     @property
     def _unknown(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Torque–speed lines of motors: the torque they give at a speed, and the fraction of a line that a demand uses.
+"""Torque–speed lines of motors: polylines with the torque at a speed, and the fraction of a line that a demand uses.
 
 A demand of torque and speed (τ, v) uses the fraction λ of a line τ = ℓ(|v|) if (τ, v)/λ lies on it: |τ|/λ = ℓ(|v|/λ).
 Unlike |τ|/ℓ(|v|), it is defined at the no-load speed, where ℓ = 0; where ℓ is constant, both are equal.
@@ -13,9 +13,12 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.foundations.errors import RobotDynError, shown
+
 Points = tuple[tuple[float, float], ...]
 """Corners (speed, torque) of a line: the torque is constant below the first speed and above the last one."""
-
+NO_LINE = np.array([[0.0], [inf]])
+"""Speed and torque of a joint without a line."""
 
 _ROUNDING = 1e-12
 
@@ -34,19 +37,35 @@ class TorqueSpeed:
     torque: np.ndarray
 
     @classmethod
+    def padded(cls, lines: Sequence[np.ndarray]) -> TorqueSpeed:
+        """Return the lines of joints, each an array of speeds and torques, (2, k)."""
+        size = max(line.shape[1] for line in lines)
+        table = np.stack([np.pad(line, ((0, 0), (0, size - line.shape[1])), "edge") for line in lines], axis=1)
+        return cls(*table)
+
+    @classmethod
     def of_joints(cls, lines: Mapping[str, Points], joint_names: Sequence[str]) -> TorqueSpeed | None:
         """Return the lines of joints by name; None if no joint has one."""
-        rows = [lines.get(name, ((0.0, inf),)) for name in joint_names]
         if not any(name in lines for name in joint_names):
             return None
-        size = max(map(len, rows))
-        table = np.array([[*row, *[row[-1]] * (size - len(row))] for row in rows])
-        return cls(table[..., 0], table[..., 1])
+        return cls.padded([np.transpose(lines[name]) if name in lines else NO_LINE for name in joint_names])
 
     @property
     def exists(self) -> np.ndarray:
         """True for joints with a line, (n,)."""
         return np.isfinite(self.torque[:, 0])
+
+    @property
+    def finite(self) -> np.ndarray:
+        """Torques at the corners, (n, k); 1 for joints without a line."""
+        return np.where(self.exists[:, None], self.torque, 1.0)
+
+    @property
+    def slopes(self) -> np.ndarray:
+        """Slopes before, between and after the corners, (n, k + 1)."""
+        step = np.diff(self.speed)
+        inner = np.divide(np.diff(self.finite), step, out=np.zeros_like(step), where=step > 0)
+        return np.pad(inner, ((0, 0), (1, 1)))
 
     def times(self, factor: float | np.ndarray) -> TorqueSpeed:
         """Return the lines with torques times a factor, a scalar or (n,)."""
@@ -72,10 +91,7 @@ class TorqueSpeed:
 
     def used(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the fraction λ of the lines that |τ| at the speed |v| uses, (..., n); 0 without a line."""
-        tau, v, x, y = np.abs(tau), np.abs(v), self.speed, np.where(self.exists[:, None], self.torque, 1.0)
-        step = np.diff(x)
-        slope = np.divide(np.diff(y), step, out=np.zeros_like(step), where=step > 0)
-        slope = np.pad(slope, ((0, 0), (1, 1)))  # of the pieces before, between and after the corners
+        tau, v, x, y, slope = np.abs(tau), np.abs(v), self.speed, self.finite, self.slopes
         start = np.concatenate([y[:, :1], y], axis=1) - slope * np.concatenate([x[:, :1], x], axis=1)
         piece = (y * v[..., None] > tau[..., None] * x).sum(axis=-1)  # the number of corners above the ray to (τ, v)
         rows = np.arange(len(x))
@@ -83,3 +99,16 @@ class TorqueSpeed:
         # beyond the last corner, at torque 0, the ray runs along the axis of speeds
         level = np.divide(tau - slope * v, start, out=np.full_like(tau, inf), where=start > 0)
         return np.where(self.exists, np.where((tau == 0) & (start <= 0), v / np.maximum(x[:, -1], 1e-300), level), 0.0)
+
+
+def check_line(name: str, speed: np.ndarray, torque: np.ndarray, error: type[RobotDynError]) -> None:
+    """Raise an error unless the speeds of a polyline increase, and its torques do not."""
+    if np.shape(speed) != np.shape(torque):
+        raise error(f"{name}: got {len(speed)} speeds and {len(torque)} torques; give one torque for each speed")
+    if not torque[0] > 0:
+        raise error(f"{name}: torque must begin with a positive value, got {torque[0]:g}")
+    step = np.diff(speed)
+    if ((step < 0) | ((step == 0) & (np.diff(torque) != 0))).any():
+        raise error(f"{name}: speed must increase from point to point, got {shown(np.asarray(speed).tolist())}")
+    if (np.diff(torque) > 0).any():
+        raise error(f"{name}: torque must not increase with speed, got {shown(np.asarray(torque).tolist())}")
