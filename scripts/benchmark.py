@@ -1,13 +1,13 @@
 """Benchmarks, both sides in one run: medians over repeats that take turns. Only ratios of one run count.
 
 Subjects: queries (Robot over bare Pinocchio), first (the first run of a process), compiled (against Pinocchio's C++),
-rollouts (against MuJoCo), steps (with an action per lane, over rollouts), parameters (numbers as inputs of machine
-code over constants), growth (cost against the number of joints), iftomm (problems A01 and A05 of the IFToMM library
-of multibody benchmarks), stiff (joints with stiff dampers and springs), sticking (time stepping of dry friction and
-stops against the event-driven limit, beside MuJoCo), precision (time against error, all methods, SciPy and MuJoCo),
-limits (position limits on and off, beside MuJoCo), energy (of a long run), estimates (of errors, beside true ones),
-proofs (radius and time of proven runs), plans (of motions: beside ruckig, paths at their limits, poses reached,
-beside pin-pink), sweeps (coverage of the intervals of each design). What accuracy costs in other scenes:
+rollouts (against MuJoCo), steps (with an action per lane, over rollouts), parameters (numbers as inputs of machine code
+over constants), growth (cost against the number of joints), iftomm (problems A01 and A05 of the IFToMM library of
+multibody benchmarks), stiff (joints with stiff dampers and springs), sticking (time stepping of dry friction and stops
+against the event-driven limit, beside MuJoCo), precision (time against error, all methods beside SciPy, MuJoCo, Drake
+and heyoka), limits (position limits on and off, beside MuJoCo), energy (of a long run), estimates (of errors, beside
+true ones), proofs (radius and time of proven runs), plans (of motions: beside ruckig, paths at their limits, poses
+reached, beside pin-pink), sweeps (coverage of the intervals of each design). What accuracy costs in other scenes:
 work_precision.py.
 """
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-_PACKAGES = ("robot-dyn", "pin", "numpy", "scipy", "llvmlite", "casadi", "mujoco")
+_PACKAGES = ("robot-dyn", "pin", "numpy", "scipy", "llvmlite", "casadi", "mujoco", "drake", "heyoka")
 
 
 def processor_and_versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:

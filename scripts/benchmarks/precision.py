@@ -1,4 +1,4 @@
-"""What accuracy costs in time: free swing of Panda-7 over 1 s, all methods, SciPy and MuJoCo.
+"""What accuracy costs in time: free swing of Panda-7 over 1 s, all methods beside SciPy, MuJoCo, Drake and heyoka.
 
 It is `rd.accuracy.work_precision`; a whole call of `rd.simulate`, with all that it checks, watches and tells,
 stands beside it.

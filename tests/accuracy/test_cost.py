@@ -166,7 +166,7 @@ def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
     found = rd.accuracy.cost(setup(), budget_s=20.0, repeats=1)
     row = found.comparison("forward dynamics")
     assert row.first.instructions > 30 and not row.first.times
-    why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take long"
+    why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take too long"
     assert any(each.startswith(why) for each in found.left_out)
 
 

@@ -16,7 +16,7 @@ from robot_dyn.view import PLOTS
 from tests.browser import opened
 from tests.command import run, said
 
-PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo"}
+PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": "heyoka"}
 
 
 @pytest.fixture(scope="module")

@@ -57,7 +57,7 @@ def test_robot_of_a_run_is_read_again_from_the_text_that_the_run_carries(file: F
     """In UTF-8, whatever the file was written in, and with what was assumed."""
     with warnings.catch_warnings(action="ignore", category=ModelWarning):
         robot = rd.load(written(file, tmp_path))
-    texts = origin(robot)
+    texts = origin(rd.Setup(rd.Plant(robot), np.zeros(robot.n), duration_s=1.0), compiled=False)
 
     class Run:
         metadata, joint_names = texts, robot.joint_names

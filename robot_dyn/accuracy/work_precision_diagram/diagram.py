@@ -24,7 +24,8 @@ _LOOK = {  # theme colour and marker, by family: explicit, Gauss, stiff, adaptiv
 }  # fmt: skip
 _PEERS = {
     "SciPy DOP853 + pin.aba": "x", "SciPy Radau + pin.aba": "+", "SciPy LSODA + pin.aba": "1", "MuJoCo RK4": "D",
-    "MuJoCo Euler": "^", "MuJoCo implicitfast": "v", "MuJoCo discrete": "<",
+    "MuJoCo Euler": "^", "MuJoCo implicitfast": "v", "MuJoCo discrete": "<", "Drake runge_kutta3": "P",
+    "heyoka, Taylor": "*",
 }  # fmt: skip
 _MAX_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
 _MAX_METHODS, _SIX_DIGITS = 8, 1e-6  # in one panel; [rad] or [m]
@@ -44,7 +45,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     """
     if not any(np.isfinite(p.error) for ladder in result.ladders for p in ladder.points):
         raise ResultError("nothing to draw: no run finished; see left_out")
-    versions = programs(result.environment, "scipy", "mujoco")
+    versions = programs(result.environment, "scipy", "mujoco", "drake", "heyoka")
     caption = "\n".join([*result.basis, versions])
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, caption, theme)
     grid = figure.add_gridspec(3, 2, width_ratios=(2.1, 1))

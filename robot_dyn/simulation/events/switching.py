@@ -55,6 +55,11 @@ class Switching:
         self.contacts, self.guards = contacts, 0 if contacts is None else len(contacts.guards[0])
         self._equations: dict[bytes, StateEquation] = {}
 
+    @property
+    def quantities(self) -> frozenset[Quantity]:
+        """All quantities that have a threshold."""
+        return frozenset((threshold.joint, threshold.of_actuation) for threshold in self.thresholds)
+
     def _is_active(self, part: int, threshold: Threshold) -> bool:
         if (threshold.joint, threshold.of_actuation) in self.dropped:  # the formulas of a joint depend on each other
             return False

@@ -5,8 +5,8 @@
 - samples: acceleration, actuation, power, energy and tracking error from states; ledger: energy and work.
 - causes: actuation of each joint by inertia, Coriolis, gravity and effect; joint_wrenches: wrenches through its joints.
 - error_estimate: the estimated error and its verdict.
-- doubts: the reasons why an estimate ends early or a ledger does not close, and their wording.
-- acting: effects by name, wrenches on links, stops that joints bear on.
-- provenance: texts from which the robot of a run is built again.
-- run_file: run files, written by `foundations/store.py`; formats: what `save` writes, by suffix.
+- doubts: reasons for an estimate that ends early or a ledger that does not close, their onset and their sentences.
+- acting: effects by name, wrenches on links, stops in contact.
+- provenance: the origin of a run as texts, from which its robot is rebuilt.
+- run_file: run files, written by `foundations/store.py`; formats: the formats of `save`, by suffix.
 """

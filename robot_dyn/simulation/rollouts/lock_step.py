@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import cast, final
 
@@ -52,7 +53,7 @@ _INSTANTS = 200  # least number of instants at which an actuation that changes b
 def lanes_code(batch: Batch, detects: bool = False) -> MachineCode:
     """Return the machine code of runs in lock step, checked; see `machine_code` for `detects`."""
     setup, options = batch.setup, {"extras": batch.extras, "swept": tuple(batch.sweep), "detects": detects}
-    return checked(setup, lambda: machine_code(setup.equation, setup.method, lanes=LANES, **options))
+    return checked(setup, partial(machine_code, setup.equation, setup.method, lanes=LANES, **options))
 
 
 @final

@@ -42,6 +42,7 @@ class EventHandler:
         state: The state of the run.
         control: Control of the steps; it chooses a new first step if the equation changes.
         degree: Degree of the dense output.
+        thresholds: True to find the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to give up where events accumulate, instead of ending the run.
 
     Attributes:
@@ -51,7 +52,7 @@ class EventHandler:
         error: Error of the rate in the latest trial step that failed, or None.
     """
 
-    def __init__(self, state: RunState, control: StepControl, degree: int, may_replace: bool) -> None:
+    def __init__(self, state: RunState, control: StepControl, degree: int, thresholds: bool, may_replace: bool) -> None:
         self.state, self.control, self.may_replace = state, control, may_replace
         self.error: RobotDynError | None = None
         setup, equation, contacts, brief = state.setup, state.equation, None, _BRIEF * state.setup.duration_s
@@ -60,8 +61,10 @@ class EventHandler:
             parameters = state.lanes.run_parameters.copy()
             contacts = contacts_of(equation, parameters, state.engine.places(), _MOST_CHANGES, brief)
             start_mode(contacts.mode, state.start[:, None].copy())
-        is_usual = contacts is None and not state.payloads.any
+        is_usual = thresholds and contacts is None and not state.payloads.any
         self.switching = cached(setup, switching_of) if is_usual else Switching(equation, contacts=contacts)
+        if not thresholds:
+            self.switching = Switching(equation, self.switching.quantities, contacts)
         if is_usual and not setup.events:
             table, coefficients = copied(cached(setup, start_table_of)), np.zeros(degree + 1)
             self.event_table = table._replace(functions=functions, coefficients=coefficients, stack=work_array(degree))

@@ -46,6 +46,7 @@ class EventSteps:
         mesh: Times at which steps end, (k,), in [s]; None for error control alone.
         samples: True to record samples; False for a companion run, which passes terminal events.
         max_evaluations: Evaluations after which the run gives up as `TooLong`.
+        thresholds: True to find the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to give up as `Stiff` or `Accumulation` where another method is better suited.
 
     Attributes:
@@ -61,6 +62,7 @@ class EventSteps:
         *,
         samples: bool,
         max_evaluations: float,
+        thresholds: bool,
         may_replace: bool,
     ) -> None:
         setup = state.setup
@@ -73,7 +75,7 @@ class EventSteps:
             config = config._replace(sample_period=inf, samples_nodes=False, samples_steps=False)
         shared = 0 if config.share_period == inf else _COMPARED + len(state.table.counts) + 2
         state.allocate(config, int(most_samples(setup)) + 2 if samples else 0, shared, _CHUNK)
-        self.handler = EventHandler(state, self.control, len(self.stepper.work.F), may_replace)
+        self.handler = EventHandler(state, self.control, len(self.stepper.work.F), thresholds, may_replace)
         method, ends = self.stepper, without_modes if self.handler.switching.contacts is None else end_mode
         self.loop = state.engine.loop() or event_loop(
             method.begin, method.step, method.error, method.accept, method.dense, ends

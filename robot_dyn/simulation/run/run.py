@@ -48,6 +48,7 @@ class Run:
         observer: Observer of each step, or None.
         samples: True to record samples; False for a companion run.
         max_evaluations: Number of evaluations of the equation of motion after which the run stops with `TooLong`.
+        thresholds: True to end steps at the thresholds of effects; otherwise the effects switch within steps.
         may_replace: True to stop with `Stiff` or `Accumulation` if another method is better suited.
 
     Attributes:
@@ -66,6 +67,7 @@ class Run:
         observer: Observer | None = None,
         samples: bool = True,
         max_evaluations: float = inf,
+        thresholds: bool = True,
         may_replace: bool = False,
     ) -> None:
         self._on_progress, self._activity = on_progress, "simulating" if samples else "estimating the error of"
@@ -85,6 +87,7 @@ class Run:
             ends,
             samples=samples,
             max_evaluations=max_evaluations,
+            thresholds=thresholds,
             may_replace=may_replace,
         )
 
