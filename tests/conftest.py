@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -24,6 +25,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Machine code of test runs is kept apart from the user's; workers, commands and the next run share it.
 os.environ.setdefault("ROBOT_DYN_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "machine_code"))
+
+
+def pytest_collection_finish() -> None:
+    """Search for garbage less often, and not among the 10 000 collected tests: it took 7 % of the processor time."""
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 @pytest.fixture(autouse=True)

@@ -71,7 +71,7 @@ def run_commands(commands: list[str], start: Callable[..., str], folder: Path) -
             (folder / file).write_text(printed, encoding="utf-8")
 
 
-@pytest.mark.long
+@pytest.mark.stress  # the gate runs them in this process below, and some with the wheel
 def test_commands_of_the_readme_run_in_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     commands = commands_of(ROOT / "README.md")

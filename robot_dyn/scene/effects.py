@@ -65,7 +65,7 @@ class Acting(Part):
         raise NotImplementedError
 
 
-class DeclaredEffect(Declared, Acting):
+class DeclaredEffect(Acting, Declared):
     """An effect with the declared coefficients of its classes."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:

@@ -141,14 +141,18 @@ def test_a_closed_stream_is_not_replaced_by_a_file_that_is_opened_later(tmp_path
     assert spawn(tmp_path / "x", code=code).returncode > 2
 
 
-@pytest.mark.parametrize("encoding", ["ascii", *long(["cp1252"]), *stress(["utf-16"])])
+COMPARED = ["compare", "pendulum", "--samples", "1"], 0, "1 of 1 agree"
+NAMED = ["info", "panda"], 0, "panda_finger_joint1"
+REFUSED = ["info", "ur6"], 2, "robot-dyn: error: no robot 'ur6'"
+
+
 @pytest.mark.parametrize(
-    ("args", "code", "shown"),
+    ("encoding", "args", "code", "shown"),
     [
-        (["compare", "pendulum", "--samples", "1"], 0, "1 of 1 agree"),
-        *long(
-            [(["info", "panda"], 0, "panda_finger_joint1"), (["info", "ur6"], 2, "robot-dyn: error: no robot 'ur6'")]
-        ),
+        ("ascii", *COMPARED),
+        *long([("cp1252", *COMPARED), ("ascii", *REFUSED)]),
+        *stress([("ascii", *NAMED), ("cp1252", *NAMED), ("cp1252", *REFUSED)]),
+        *stress([("utf-16", *case) for case in (COMPARED, NAMED, REFUSED)]),
     ],
 )
 def test_output_in_an_encoding_without_mathematical_signs(encoding: str, args: list[str], code: int, shown: str):

@@ -129,6 +129,7 @@ def test_no_bar_says_that_it_simulates_where_nothing_is_simulated() -> None:
 
 def test_a_sweep_that_is_complete_has_no_pace(scene: Path, tmp_path: Path) -> None:
     folder, vary = tmp_path / "out", "mass_scale=uniform(low=0.9, high=1.1)"
+    scene.write_text(PENDULUM.replace("40.0", "1.0"), encoding="utf-8")
     assert run("sweep", scene, "-o", folder, "--runs", "4", "--vary", vary).returncode == 0
     code, seen = watched("sweep", "run", folder)
     assert code == 0 and "4 of 4 runs" in seen and not re.search(r"[\d.]+ a second", seen)

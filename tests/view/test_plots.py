@@ -83,17 +83,19 @@ def test_options_without_meaning_are_refused(run, options: dict, text: str) -> N
         plot(run, **options)
 
 
-@pytest.mark.long
-def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
+@pytest.mark.parametrize("names", [*long([[]]), *stress([["joints"]])], ids=["overview", "joints"])
+def test_thirty_joints_keep_their_names_and_do_not_overlap(run, names: list[str]) -> None:
     """In the overview each has a row of 8.4 mm or more."""
-    thirty = replace(many(run, 30), extremes=None)
-    for figure in (plot(thirty, "joints"), plot(thirty)):
-        figure.draw_without_rendering()
-        assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == [f"joint_{i:02d}" for i in range(30)]
-        boxes, page = [axes.get_window_extent() for axes in figure.axes], figure.bbox
-        assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-        assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
-    assert all(box.height / figure.dpi * MM >= 8.4 for box in boxes)
+    figure = plot(replace(many(run, 30), extremes=None), *names)
+    figure.draw_without_rendering()
+    assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == [f"joint_{i:02d}" for i in range(30)]
+    boxes, page = [axes.get_window_extent() for axes in figure.axes], figure.bbox
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
+    assert names or all(box.height / figure.dpi * MM >= 8.4 for box in boxes)
+
+
+def test_more_joints_than_a_figure_has_room_for_are_refused(run) -> None:
     with pytest.raises(PlotError, match=f"1 to {MAX_JOINTS}; select some"):
         plot(many(run, MAX_JOINTS + 1), "joints")
 

@@ -21,8 +21,6 @@ from robot_dyn.codegen.llvm.target import Target, this_target
 if TYPE_CHECKING:
     from robot_dyn.codegen.store.cache import Store
 
-# Lines. Lower effort compiles 15 000 lines in 0.4 s instead of 0.8 s, with 2 % slower code; 31 000 in 4 s, not 12 s.
-_LONG = 10_000
 Write = Callable[[ir.Module, str], None]  # writes functions into a module, with a prefix before each name
 _lock = threading.RLock()
 _loaded: dict[str, bytes] = {}  # object files by key
@@ -35,12 +33,12 @@ class Passes:
 
     Attributes:
         level: Level of the passes over instructions, 0 to 3.
-        effort: Level of register allocation, 0 to 3; None for 3, or 1 for a long module, because the time of
-            allocation grows faster than linearly with the length of a block.
+        effort: Level of instruction selection and scheduling, 0 to 3. Above 1, instructions are scheduled a second
+            time, after registers are allocated: that doubles the time of a long block without making its code faster.
     """
 
     level: int = 3
-    effort: int | None = None
+    effort: int = 1
 
 
 _ALL = Passes()
@@ -76,17 +74,13 @@ def addresses(
 def object_file(write: Write, name: str, passes: Passes = _ALL, target: Target | None = None) -> bytes:
     """Compile a module to an object file, for this processor or another target."""
     target = target or this_target()
-    module = _optimised(write, name, target, passes.level)
-    effort = passes.effort
-    if effort is None:
-        effort = 1 if str(module).count("\n") > _LONG else 3
-    return target.machine(effort).emit_object(module)
+    return target.machine(passes.effort).emit_object(_optimised(write, name, target, passes.level))
 
 
 def assembly(write: Write, name: str) -> str:
     """Return the instructions of a module's machine code as text."""
     target = this_target()
-    return target.machine().emit_assembly(_optimised(write, name, target))
+    return target.machine(_ALL.effort).emit_assembly(_optimised(write, name, target))
 
 
 def _optimised(write: Write, name: str, target: Target, level: int = 3) -> binding.ModuleRef:

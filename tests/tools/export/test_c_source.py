@@ -24,7 +24,7 @@ from robot_dyn.tools.export.equations import QUANTITIES, equations_of
 from robot_dyn.tools.export.operations import evaluated, math_functions, statements
 from robot_dyn.tools.export.rounding import UNITS, StatesOfArm, bound, box_of
 from tests.command import ROOT, run
-from tests.long import third
+from tests.long import stress, third
 from tests.promised import check_document
 from tests.tools.export.c_program import HOST, STRICT, TARGETS, WRITABLE, call, library, self_test, symbols
 
@@ -33,7 +33,7 @@ QUICK = (  # a fifth of the catalog: chains, trees, slides, coupled joints
     "planar_2r", "simple_pendulum", "skew_tree", "so100", "twodofs", "ur3_gripper", "ur5", "z1",
 )  # fmt: skip
 SLOW_IN_FLOAT = {"light_tip", "mimic_chain", "panda", "skew_tree", "so100", "z1"}  # in tests.campaigns.exported_c
-OTHERS = [name for name in rd.list_robots() if name not in QUICK]
+OTHERS = [name for name in rd.list_robots() if name not in {*QUICK, "tiago_dual"}]
 ARM = rd.load("planar_2r")
 UR5 = rd.load("ur5")
 
@@ -71,7 +71,7 @@ class Written:
 
 
 @needs_cc
-@pytest.mark.parametrize("name", [*QUICK, *third(OTHERS)])
+@pytest.mark.parametrize("name", [*QUICK, *third(OTHERS), *stress(["tiago_dual"])])
 def test_robots_of_the_catalog_pass_their_self_test(name: str, tmp_path: Path) -> None:
     """Built with all warnings as errors. The tolerance is 16 times the largest difference at 10 000 states."""
     try:

@@ -39,7 +39,15 @@ def made(name: str) -> rd.tools.stress.Stress:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nine_tenths(name: str) -> None:
+def test_what_is_found_is_worst_is_confirmed_and_can_be_repeated(name: str) -> None:
+    """In one test, so that one worker searches."""
+    searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nine_tenths(name)
+    each_limit_is_confirmed_or_said(name)
+    states_repeat_the_worst_that_was_found(name)
+    setups_repeat_what_confirmed_a_limit(name)
+
+
+def searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nine_tenths(name: str) -> None:
     found = made(name).worst
     assert {"κ of M", "fastest motion"} <= {each.quantity for each in found}
     for each in found:
@@ -89,8 +97,7 @@ def test_largest_payload_of_a_pole_is_that_of_statics() -> None:
     assert payload.confirmed and payload.joint == "hinge" and payload.description.endswith("end")
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_each_limit_is_confirmed_or_said(name: str) -> None:
+def each_limit_is_confirmed_or_said(name: str) -> None:
     result = made(name)
     assert {each.kind for each in result.limits} == {"step", "gain", "speed", "payload"}
     assert result.failures == () and result.ok
@@ -148,8 +155,7 @@ def test_runs_of_all_families_are_judged_and_say_what_is_true() -> None:
     assert sum(isfinite(each.true) for each in found) >= len(FAMILIES) - 2
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_states_repeat_the_worst_that_was_found(name: str) -> None:
+def states_repeat_the_worst_that_was_found(name: str) -> None:
     """By public queries of the robot, its certificate, and the advisor."""
     result, robot = made(name), rd.load(name)
     for each in result.worst:
@@ -181,8 +187,7 @@ def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
     return law.kp, law.kd
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_setups_repeat_what_confirmed_a_limit(name: str) -> None:
+def setups_repeat_what_confirmed_a_limit(name: str) -> None:
     """The run within a limit stays where the one beyond it goes, ten times as far or more."""
     confirmed = [each for each in made(name).limits if each.confirmed and len(each.setups) == 2]
     confirmed = list({each.kind: each for each in confirmed}.values())  # of steps one method
