@@ -57,8 +57,8 @@ class Facts:
 
     Attributes:
         one_by_one: Runs simulated one by one.
-        t: Times of the samples, in [s]; empty if none are kept.
-        joints: Names of the joints of the samples; empty if none are kept.
+        t: Times of the samples, in [s]; empty if a sweep keeps no samples.
+        joints: Names of the joints of the samples; empty if a sweep keeps no samples.
     """
 
     one_by_one: OneByOne
