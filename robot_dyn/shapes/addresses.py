@@ -1,7 +1,7 @@
 """Mesh addresses in a URDF, resolved to files: package://, file://, or a path relative to the URDF's folder.
 
-Paths of another computer, of Linux or Windows, are searched by their ends in the folders above the URDF, then by name
-in meshes/ next to it.
+For paths from another computer, Linux or Windows, the last parts of the path are searched in the folders above the
+URDF, then the file name in meshes/ next to it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from robot_dyn.foundations.errors import CatalogError, shorten
 from robot_dyn.shapes.mesh_files import MeshError
 
 _LEVELS = 4  # number of folders above a URDF that may be its package, as in package/robots/arm/urdf
-_LONGEST = 8  # parts of the longest end of a path that is searched
+_LONGEST = 8  # largest number of last parts of a path that are searched
 
 
 def shown(address: str | None) -> str:
@@ -43,17 +43,17 @@ def find_file(
     in meshes/ next to it. A remark is then added.
 
     Raises:
-        MeshError: If the address does not name a file, or no file is found; the message follows the address.
+        MeshError: If the address does not name a file, or no file is found; callers put the address before the message.
     """
     address = (address or "").strip()
     kind, path = _kind_and_path(address)
     if not path or kind not in ("", "file", "package"):
-        raise MeshError("its address is not that of a local file; write a path, file:// or package://")
+        raise MeshError("the address is not that of a local file; write a path, file:// or package://")
     if kind != "package":
-        for exact in (path, path.replace("\\", "/")):  # backslashes are letters of a name on Linux
+        for exact in (path, path.replace("\\", "/")):  # on Linux, backslashes may be part of a name
             if os.path.exists(file := source.absolute().parent / exact):
                 return file
-        fault = "some mesh files are not at their paths"
+        fault = "some mesh files are not at their stated paths"
         remedy = "write its path relative to the URDF"
     else:
         address, path = address.replace("\\", "/"), path.replace("\\", "/")
@@ -63,13 +63,13 @@ def find_file(
         name, _, path = path.lstrip("/").partition("/")
         path = "" if ".." in Path(path).parts else path
         fault = f"package {shorten(name)!r} is not found"
-        remedy = "add its package's folder to package_dirs, --package-dir or ROS_PACKAGE_PATH"
+        remedy = "add the folder of its package to package_dirs, --package-dir or ROS_PACKAGE_PATH"
     parts = [part for part in re.split(r"[/\\]+", path) if part not in ("", ".")]
     for folder, end in _elsewhere(parts, source, whole=kind == "package"):
         if os.path.isfile(file := folder.joinpath(*end)):
             whole = kind == "package" and end == parts
-            place = f"its files are taken from {folder.name!r} above the URDF"
-            remark = f"{fault}; {place if whole else f'files of the same name are read in {file.parent.name!r}'}"
+            place = f"its files are read from {folder.name!r} above the URDF"
+            remark = f"{fault}; {place if whole else f'files of the same name are read from {file.parent.name!r}'}"
             if remarks is not None and remark not in remarks:
                 remarks.append(remark)
             return file.resolve()
@@ -95,7 +95,7 @@ def _kind_and_path(address: str) -> tuple[str, str]:
 
 
 def _elsewhere(parts: list[str], source: Path, whole: bool) -> Iterator[tuple[Path, list[str]]]:
-    """Yield folders and ends of a path to search: the longest end first, and the nearest folder.
+    """Yield folders and last parts of a path to search: most parts first, and the nearest folder first.
 
     A name alone is searched only next to the URDF and in meshes/ there, unless it is the `whole` path in a package.
     """
@@ -109,6 +109,6 @@ def _elsewhere(parts: list[str], source: Path, whole: bool) -> Iterator[tuple[Pa
 
 
 def _installed() -> Iterator[Path]:
-    """Return the folder of the installed package example-robot-data, for runs from a machine with another one."""
+    """Yield the folder of the installed package example-robot-data, for runs from a machine with another folder."""
     parents = (folder for name in catalog.list_robots() for folder in catalog.find(name).parents)
     return islice((folder.parent for folder in parents if folder.name == "example-robot-data"), 1)

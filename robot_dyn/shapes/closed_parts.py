@@ -1,7 +1,7 @@
 """Closed parts of a mesh: connected surfaces, oriented outward, and cavities, oriented inward.
 
 A part inside another one is a cavity if it faces inward; if it faces outward, both fill the same space. Winding numbers
-at points just inside the surfaces decide which part contains another one, and which parts intersect.
+at points just inside the surfaces determine which part contains another one, and which parts intersect.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from robot_dyn.shapes.winding import just_inside, winding
 
 _SAME = 1e-7  # relative to the size of a mesh: closer corners are merged
-_FLAT = 1e-9  # relative to the cube of its length: smaller volumes count as none
-_MAX, _FEWEST, _WORK = 192, 48, 4_000_000  # limits of the points on a part; limit of points × triangles
+_FLAT = 1e-9  # relative to the cube of its length: smaller volumes count as 0
+_MAX, _MIN, _WORK = 192, 48, 4_000_000  # largest and smallest number of points on a part; limit of points × triangles
 
 
 @final
@@ -29,7 +29,7 @@ class ClosedParts:
 
     Attributes:
         corners: Triangle corners of each part, (m, 3, 3), in [m], counter-clockwise seen from outside the material.
-        flipped_parts: Indices of parts whose faces, some or all, were inside out and were flipped.
+        flipped_parts: Indices of parts with faces that were inside out and were flipped.
         overlaps: Pairs of parts that share some volume.
     """
 
@@ -159,7 +159,7 @@ def _common(low: ndarray, high: ndarray, lows: ndarray, highs: ndarray) -> list[
 
 def _fraction_inside(part: ndarray, other: ndarray) -> float:
     """Return the fraction of points just inside a part that lie inside another one."""
-    points = just_inside(part, int(np.clip(_WORK // max(len(part), len(other)), _FEWEST, _MAX)))
+    points = just_inside(part, int(np.clip(_WORK // max(len(part), len(other)), _MIN, _MAX)))
     low, high = other.min(axis=(0, 1)), other.max(axis=(0, 1))
     near = ((points > low) & (points < high)).all(axis=1)
     if not near.any():

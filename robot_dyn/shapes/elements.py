@@ -1,4 +1,4 @@
-"""Numbers of the <visual> and <collision> elements of a URDF, which the checked description leaves out."""
+"""Numbers of the <visual> and <collision> elements of a URDF, which the checked description omits."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Estimate:
     Attributes:
         link: Name of the link.
         body: Mass properties in the frame of the link.
-        basis: Shape and mass on which the estimate is based, in words.
+        basis: Shape and mass on which the estimate is based, as text.
         moments_only: True if mass and centre of mass are those of the file.
     """
 
@@ -79,7 +79,7 @@ def with_estimates(description: Description, masses: Masses, package_dirs: Itera
         QueryError: If a mass is given for an unknown link or for one that has a mass, no mass is left to share, or a
             moving body remains without mass.
         DescriptionError: If the shape of such a link cannot be read and the link moves. A link of the base, which does
-            not affect the dynamics, is left out with a finding.
+            not affect the dynamics, is omitted with a finding.
     """
     shapes, unread = shapes_of_incomplete_links(description, package_dirs, masses.allow_overlap)
     new, left_out = estimates(description, shapes, masses, unread)
@@ -156,7 +156,7 @@ def _of_mass(mass: float, body: MassProperties) -> MassProperties:
 def _left_out(without: Mapping[str, LinkShape], mass_of: Mapping[str, Any]) -> Iterator[str]:
     for name in without:
         if name not in mass_of:
-            yield f"link {name!r}: has a shape but no <inertial>, and no mass was given; it stays massless"
+            yield f"link {name!r}: has a shape but no <inertial>, and no mass was given; it remains massless"
 
 
 def _unread(unread: Mapping[str, str], masses: Masses, stated_masses: Mapping[str, float]) -> Iterator[str]:

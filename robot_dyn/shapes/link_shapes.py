@@ -47,7 +47,7 @@ class LinkShape:
         solid: Primitives, closed meshes, and the convex hulls of open meshes; at 1 kg/m³.
         hull: Convex hulls of all elements; at 1 kg/m³.
         shell: Surfaces of all elements; at 1 kg/m².
-        origin: Elements used, in words, for example "open collision mesh, by its convex hull".
+        origin: Elements used, as text, for example "open collision mesh, by its convex hull".
     """
 
     solid: MassProperties
@@ -121,7 +121,7 @@ class _Reader:
                 f"mesh {as_written(flat.get('filename'))}: is flat and encloses no volume; export a closed surface,"
                 " use a box, or add an <inertial>"
             )
-        # no names of folders: the words become a comment in the file, and the file may be published
+        # no folder names: the text becomes a comment in the file, which may be published
         elsewhere = ", in a file of the same name instead of the stated one" if self.remarks else ""
         return LinkShape(combined(solid), combined(hull), combined(shell), _origin(kind, stated, read) + elsewhere)
 
@@ -164,7 +164,7 @@ def _of_primitive(shape: Any) -> _Bodies:
 
 
 def _origin(kind: str, stated: list[Any], read: list[_Bodies]) -> str:
-    """Describe the elements of a shape in words."""
+    """Describe the elements of a shape."""
     tags = [elements.shape(element).tag for element in stated]
     closed_meshes = [bodies.closed for tag, bodies in zip(tags, read, strict=True) if tag == "mesh"]
     words = [f"{kind} {tag}" for tag in dict.fromkeys(tags) if tag != "mesh"]

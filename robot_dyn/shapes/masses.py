@@ -1,4 +1,4 @@
-"""Masses of links that a file leaves out: given by link, by the total of the robot, or by a density.
+"""Masses of links that a file does not state: given by link, by the total of the robot, or by a density.
 
 total    mᵢ = (total − Σ stated) Vᵢ / Σ V     V: volume of the convex hulls of the shapes
 density  mᵢ = ρ Vᵢ                           V: volume of the solids; convex hulls for open meshes
@@ -47,12 +47,12 @@ class Masses:
             if (value := getattr(self, key)) is not None:
                 object.__setattr__(self, key, number(name, value, above=0))
         if self.total is not None and self.density is not None:
-            raise QueryError("total_mass and density contradict each other; give one of them")
+            raise QueryError("total_mass and density exclude each other; give one of them")
         if not masses and self.total is None and self.density is None:
             raise QueryError("inertias from shapes need a mass: give mass by link, total_mass or density")
 
     def check_links(self, links: Mapping[str, object], measured: Mapping[str, float]) -> None:
-        """Raise QueryError for an unknown link, or one whose mass the file states; `measured` has these, in [kg]."""
+        """Raise QueryError for an unknown link, or one whose mass the file states; `measured` has these masses."""
         for link in self.by_link:
             if link not in links:
                 raise QueryError(f"mass: no link {link!r}; {nearest(str(link), [*links])}")
@@ -63,10 +63,10 @@ class Masses:
                 )
 
     def shared(self, shapes: Mapping[str, LinkShape], measured: float) -> dict[str, tuple[float, str]]:
-        """Return mass and origin of the mass of each link with a shape, where these masses define it.
+        """Return the mass of each link with a shape, and the origin of the mass, where these masses define it.
 
         Args:
-            shapes: Shapes of the links whose mass the file leaves out.
+            shapes: Shapes of the links whose mass the file does not state.
             measured: Mass of the other links together, in [kg].
 
         Raises:

@@ -29,7 +29,7 @@ _UNSEEN = ("library_lights", "library_cameras", "library_animations", "instance_
 
 
 class MeshError(RobotDynError):
-    """A shape or texture cannot be read; the message gives the reason, to follow the name of the file or link."""
+    """A shape or texture cannot be read; the message is the reason, which follows the name of the file or link."""
 
 
 def bounded(path: Path) -> bytes:
@@ -109,7 +109,7 @@ def checked_collada(data: bytes) -> etree._Element:
 
 
 def check_gltf(data: bytes, resolver: FilePathResolver) -> None:
-    """Raise MeshError for files that trimesh would silently draw wrong, and for accessors larger than the file.
+    """Raise MeshError for files that trimesh would silently draw wrongly, and for accessors larger than the file.
 
     For such accessors trimesh would allocate arrays of zeros.
     """

@@ -1,8 +1,8 @@
 """Mesh files as plain triangles: one mesh per material, creased normals, equal corners merged.
 
-The transforms of a scene and a Collada `<unit>` are applied. glTF specifies y up: it is turned to z up before the scale
-of the URDF is applied, as in Drake and rviz. A Collada `<up_axis>` is ignored, as in rviz, but reported, because Gazebo
-applies it. STL, OBJ and PLY define no up axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
+The transforms of a scene and a Collada `<unit>` are applied. glTF specifies y up: it is rotated to z up before the
+scale of the URDF is applied, as in Drake and rviz. A Collada `<up_axis>` is ignored, as in rviz, but reported, because
+Gazebo applies it. STL, OBJ and PLY have no up axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Part:
         mesh: Scaled triangles, in the frame of the file or turned to z up.
         rgba: Colour, or None if the file has none.
         image: Texture as PNG, or None.
-        y_up: Format of the file if it declares y up, else None.
+        y_up: Format of the file if it declares y up, otherwise None.
     """
 
     mesh: Mesh

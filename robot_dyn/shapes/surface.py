@@ -4,9 +4,9 @@
     shell         same, over the surface                                         at 1 kg/m², m is the area
 
 Over a triangle with corners v₁, v₂, v₃ and area A, ∫ x dA = A s/3 and ∫ x xᵀ dA = A (Σ vᵢ vᵢᵀ + s sᵀ)/12, s = Σ vᵢ.
-trimesh integrates the solids. The origin is moved to the middle of the triangles, so that bodies far from the frame
-lose no digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, whose plane case is the
-triangle]
+trimesh integrates the solids. The origin is moved to the middle of the triangles, so that bodies far from the frame do
+not lose digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005; the triangle is its plane
+case]
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
 def _plausible(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:
     """Return unit normals, or None if they are not finite, point inward, or merely repeat the flat triangles.
 
-    Many exporters write flat normals for round surfaces: computing them halves the file and looks right.
+    Many exporters write flat normals for round surfaces: computed normals halve the file and look right.
     """
     if normals is None:
         return None

@@ -2,7 +2,8 @@
 
     w(p) = Σ s over the triangles that a ray from p crosses,   s = 1 where it leaves the surface, −1 where it enters
 
-Three oblique rays vote, because a ray may pass through the gap between corners that a file rounds differently.
+The majority of three oblique rays counts, because a ray may pass through a gap between corners that a file rounds
+differently.
 [O'Rourke, Computational Geometry in C, 1998, §7.5]
 """
 

@@ -1,7 +1,7 @@
 """The viewer: replays in the browser, live or as one file, and plots.
 
 replay.py        `replay`, `show` and their files
-document.py      what a page consists of: runs, or a robot at one configuration
+document.py      contents of a page: runs, or a robot at one configuration
 stage.py, keyframes.py    the robot as a tree of moving nodes; the samples that are drawn
 overlays.py, rests.py, scenery.py    centre of mass, trace, stops, arrows; held joints; floor, gravity, camera
 series.py, tables.py  the plots and the table of a page

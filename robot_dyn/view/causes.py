@@ -14,7 +14,7 @@ from robot_dyn.simulation.results.causes import causes_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.series import effort_limits
 
-_MAX = 2000  # samples; no slider is wider in pixels of a screen
+_MAX = 2000  # samples; more than the pixels of any slider
 _STEPS = 32767  # largest 16-bit integer, for the largest torque of a joint
 
 
@@ -37,8 +37,8 @@ def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
 def resolution(entry: dict[str, Any]) -> str:
     """Return a note on the resolution of the torques by cause in time and value."""
     return (
-        f"torque by cause is shown at {len(entry['t'])} samples, the latest one at each time, to"
-        f" 1/{2 * _STEPS} of the largest of its joint"
+        f"torques by cause are those of the latest of {len(entry['t'])} samples, rounded to 1/{2 * _STEPS} of the"
+        " largest torque of the joint"
     )
 
 

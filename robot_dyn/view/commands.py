@@ -24,7 +24,7 @@ _DOUBLE_SIDE = 2  # meshes of real robots have triangles that face the wrong way
 
 
 class Canvas:
-    """The commands that draw a scene; what moves stands at its beginning until the page moves it."""
+    """The commands that draw a scene; moving nodes are at their first keyframe until the page moves them."""
 
     def __init__(self) -> None:
         self._commands: list[Command] = []
@@ -32,7 +32,7 @@ class Canvas:
 
     @property
     def commands(self) -> list[Command]:
-        """All commands, the animation last."""
+        """All commands; the animation is the last."""
         clips = [
             {"path": path, "clip": {"name": path, "fps": 1, "tracks": entry}} for path, entry in self._tracks.items()
         ]
@@ -40,18 +40,18 @@ class Canvas:
         return [*self._commands, {"type": "set_animation", "animations": clips, "options": options, "path": "replay"}]
 
     def mesh(self, path: str, geometry: Command, rgba: Rgba, image: bytes | None = None) -> None:
-        """Put the geometry of a mesh, with its colour and its texture, a PNG, at a node."""
+        """Add a mesh to a node, with its colour and its texture, a PNG."""
         shading = {"side": _DOUBLE_SIDE, "shininess": 30, "specular": 0x222222}
         has_colors = "color" in geometry["data"]["attributes"]
         self._put(path, "Mesh", geometry, "MeshPhongMaterial", rgba, shading | {"vertexColors": has_colors}, image)
 
     def line(self, path: str, points: np.ndarray, rgba: Rgba, kind: str = "Line") -> None:
-        """Put a line through points (k, 3) at a node; of kind "LineSegments" each pair of points is a line."""
+        """Add a line through points (k, 3) to a node; with kind "LineSegments" each pair of points is a line."""
         geometry = _geometry({"position": _attribute(points.astype(np.float32))})
         self._put(path, kind, geometry, "LineBasicMaterial", rgba, {"linewidth": 2, "vertexColors": False})
 
     def place(self, path: str, matrix: np.ndarray) -> None:
-        """Place a node in its parent, by a matrix (4, 4)."""
+        """Set the placement of a node in its parent, (4, 4)."""
         self._commands.append({"type": "set_transform", "path": path, "matrix": matrix.T.ravel().tolist()})
 
     def hide(self, path: str) -> None:
@@ -59,7 +59,7 @@ class Canvas:
         self._commands.append({"type": "set_property", "path": path, "property": "visible", "value": False})
 
     def move(self, path: str, **tracks: tuple[np.ndarray, np.ndarray]) -> None:
-        """Move a node: times (k,) and values of its position, quaternion (x, y, z, w) or scale, or if it is visible."""
+        """Animate a node: times (k,) and values of its position, quaternion (x, y, z, w), scale or visibility."""
         self._tracks[path] = [
             {
                 "name": f".{name}",
@@ -110,7 +110,7 @@ def triangles(mesh: Mesh) -> Command:
 def as_text(document: Any) -> str:
     """Return a document that contains arrays as text for the page's script: length, JSON and arrays, then `packed`.
 
-    For better compression, an array is stored by bytes: the first bytes of all numbers, then the second ones …
+    For better compression, an array is stored byte by byte: the first bytes of all numbers, then the second, and so on.
     """
     arrays: dict[str, tuple[int, bytes]] = {}
     end = 0
@@ -118,7 +118,7 @@ def as_text(document: Any) -> str:
     def place(array: Any) -> Any:
         nonlocal end
         if not isinstance(array, np.ndarray):
-            raise TypeError(f"cannot be written: {type(array)}")
+            raise TypeError(f"{type(array)} cannot be written")
         numbers = array.tobytes()
         name = _name(array.dtype.name, numbers)
         if name not in arrays:

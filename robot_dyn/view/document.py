@@ -1,6 +1,6 @@
-"""The document of a page, from which it is drawn: runs as they were simulated, or a robot at one configuration.
+"""The document from which a page is drawn: runs, or a robot at one configuration.
 
-The first run is drawn opaque, the others as ghosts. Problems list parts that differ from the files.
+The first run is drawn opaque, the others as ghosts. Its problems are parts that are not drawn as their files state.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ class Shown:
 
     Attributes:
         name: Name in titles and notes.
-        prefix: Text before its notes if there are several runs; otherwise empty.
+        prefix: Prefix of its notes if there are several runs; otherwise empty.
         run: The part of the run that can be drawn.
         stage: Stage of its robot.
         motion: Samples of the run, and points between them.
         keys: Keyframes of its joints.
-        drawing: The look of its robot.
-        hidden: Samples after this part.
+        drawing: Appearance of its robot.
+        hidden: Number of samples after this part.
     """
 
     name: str
@@ -78,10 +78,10 @@ def document_of(
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If it carries no robot, or no robot has the frame, or the names are not one text for each run.
+        QueryError: If a run lacks its robot, no robot has the frame, or there is not one name per run.
     """
     for run in runs:
-        instance("run", run, TrajectoryData, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
+        instance("run", run, TrajectoryData, "give a trajectory of rd.simulate, or a run of rollouts, such as runs[0]")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     instance("frame", frame, str | None, "give the name of a link, or None")
     names = run_names(*runs) if names is None else _checked_names(names, len(runs))
@@ -108,7 +108,7 @@ def document_of(
         page.notes += [*item.drawing.remarks, note, *draw_stops(page.canvas, stage, run, radius)]
         page.notes[start:] = [item.prefix + text for text in page.notes[start:]]
         if item.hidden:
-            hidden = f"the last {item.hidden} samples are not shown: not finite, or beyond {_FAR:g}"
+            hidden = f"the last {item.hidden} samples are not shown, because they are not finite or beyond {_FAR:g}"
             problems.append(item.prefix + hidden)
         problems += [item.prefix + text for text in item.drawing.notes]
         remarks += [item.prefix + line for line in remark_lines(run.remarks)]
@@ -145,7 +145,7 @@ def still(
     Raises:
         QueryError: If q is not one configuration of the robot.
     """
-    instance("robot", robot, Robot, "give one of rd.load")
+    instance("robot", robot, Robot, "give a robot, for example rd.load('ur5')")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     at: Array = np.zeros(robot.n) if q is None else one_state("q", q, robot.joint_names)
     if np.abs(at).max() > _FAR:
@@ -188,7 +188,7 @@ class _Document:
 
     def entries(self, **entries: Any) -> dict[str, Any]:
         """Return the document with these entries."""
-        floor = f"the squares on the floor are {self.scenery.square:g} m wide"
+        floor = f"squares on the floor are {self.scenery.square:g} m wide"
         return entries | {
             "layers": {"inertia": self._shows_boxes, "paths": self.paths},
             "notes": [*self.notes, *turned(self._gravity), floor],
@@ -203,7 +203,7 @@ def _checked_names(names: object, count: int) -> tuple[str, ...]:
         texts = tuple(dict.fromkeys(name for name in names if isinstance(name, str) and name.strip()))
         if len(texts) == len(names) == count:
             return texts
-    raise QueryError(f"names must be {count} different texts, one for each run, got {shown(names)}")
+    raise QueryError(f"names must be {count} different texts, one per run, got {shown(names)}")
 
 
 def _outcome(shown: Shown) -> str:
@@ -240,7 +240,7 @@ def _drawable(run: TrajectoryData) -> TrajectoryData:
     good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & u, axis=1)
     end = len(good) if good.all() else int(good.argmin())
     if not end:
-        raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")
+        raise ReplayError("the run has no samples that can be drawn; simulate it again with a smaller step")
     cut = {x.name: taken(getattr(run, x.name), slice(end)) for x in fields(run) if x.name in SAMPLED}
     wrenches = {link: F[F[:, 0] <= run.t[end - 1]] for link, F in run.wrenches.items()}
     return replace(run, **cut, wrenches=wrenches)
@@ -254,7 +254,7 @@ def _corners(shown: Shown, inertia: bool) -> np.ndarray:
 
 
 def _labels(shown: list[Shown]) -> str:
-    """Return the gravity of the first run, and that of other runs where it differs."""
+    """Return the label of gravity in the first run, and in other runs with another gravity."""
     first = shown[0].stage.robot
     others = [
         f"{item.name}: {item.stage.robot.edits.gravity} m/s²"

@@ -1,7 +1,7 @@
 """Keyframes: times between which a straight line replaces a run, |q(t) − q_line(t)| ≤ tolerance.
 
-Between samples a run is Hermite's polynomial of q, v and a. A joint's turn is interpolated about its own axis, so a
-line in q is what the viewer draws between keyframes. [Ramer 1972; Douglas, Peucker 1973]
+Between samples a run is the Hermite polynomial of q, v and a. The viewer interpolates the rotation of a joint about its
+axis, so it draws a line in q between keyframes. [Ramer 1972; Douglas, Peucker 1973]
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 5e-4  # [rad] or [m]; half a millimetre at a reach of one metre, below a pixel of the screen
 CHORD = TOLERANCE / 10  # largest error of lines between the times of a `Motion`
-_LARGEST_TURN = pi / 2  # between keyframes; from π on a viewer would take the shorter way round
+_LARGEST_TURN = pi / 2  # between keyframes; a viewer would take the shorter way round for more than π
 _MAX_PARTS = 64  # parts of the time between two samples
-_LOOKS = (0.25, 0.5, 0.75)  # parts of that time at which the polynomial is compared with others
-_CHUNK = 20_000  # samples that are joined at a time
+_LOOKS = (0.25, 0.5, 0.75)  # fractions of that time at which polynomials are compared
+_CHUNK = 20_000  # samples processed at a time
 
 
 class Motion(NamedTuple):
@@ -47,7 +47,7 @@ class Keyframes:
     Attributes:
         t: Times, (k,), in [s]; rounded to single precision, as in the viewer.
         q: Positions, (k, N).
-        samples: Number of samples they stand for.
+        samples: Number of samples that they replace.
         error: Largest deviation from a sample, for each joint, (N,), in [rad] or [m].
     """
 
@@ -58,7 +58,7 @@ class Keyframes:
 
 
 def motion_of(run: TrajectoryData) -> Motion:
-    """Return the samples of a run, and the points between them that straight lines need."""
+    """Return the samples of a run, with intermediate points so that straight lines are accurate."""
     data = [run.q, run.v] + ([run.a] if np.isfinite(run.a).all() else [])
     columns = np.stack(data, axis=1)
     times, points, left = [], [], [np.zeros(run.q.shape[1])]
@@ -103,12 +103,12 @@ def stated_error(run: TrajectoryData, motion: Motion, keys: Keyframes, units: Ma
     worst = int(keys.error.argmax())
     name, unit = list(units.items())[worst]
     text = (
-        f"{len(run.t)} samples, between which joint positions follow q, v and a, are drawn by {len(keys.t)} keyframes:"
+        f"{len(run.t)} samples, interpolated by q, v and a, are drawn by {len(keys.t)} keyframes: joint positions are"
         f" off by at most {keys.error[worst] + CHORD:.1e} {unit} ({name})"
     )
     if (doubt := float(motion.open.max())) > TOLERANCE:
         unsure = run.joint_names[int(motion.open.argmax())]
-        text += f"; samples are so far apart that these positions are known to {doubt:.1g} only ({unsure})"
+        text += f"; samples are so far apart that positions between them are accurate only to {doubt:.1g} ({unsure})"
     return text
 
 
@@ -131,7 +131,7 @@ def corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _short_turns(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Add keyframes where a joint turns too far between two."""
+    """Add keyframes where a joint rotates too far between two of them."""
     parts = np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) / _LARGEST_TURN).astype(int)
     parts = np.maximum(parts, 1)
     at = np.concatenate([k + np.arange(n) / n for k, n in enumerate(parts)] + [[len(t) - 1.0]])

@@ -1,6 +1,6 @@
-"""Overlays of a replay: p_com = Σ mᵢ pᵢ / Σ mᵢ, the paths of frames, stops, and arrows of external wrenches (f, τ).
+"""Overlays of a replay: centre of mass Σ mᵢ pᵢ / Σ mᵢ, paths of frames, stops, and arrows of external wrenches (f, τ).
 
-Paths are thinned like joints: a straight line replaces the samples between keyframes, to a fraction of the scene.
+Paths are thinned like joint positions: straight lines between keyframes, accurate to a fraction of the scene.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _COM: Rgba = (0.94, 0.89, 0.26, 1.0)
 _TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
 _STOP: Rgba = (0.9, 0.05, 0.05, 0.75)
 _PART = 5e-4  # fraction of the scene: largest error of a path between keyframes
-_LONGEST = 0.4  # fraction of the radius of the scene: the arrow of the largest force or torque of all runs
+_LONGEST = 0.4  # length of the arrow of the largest force or torque of all runs, in radii of the scene
 _WRENCH: tuple[tuple[str, str, slice, str, Rgba], ...] = (
     ("force", "orange", slice(1, 4), "N", (0.84, 0.37, 0.0, 1.0)),
     ("torque", "pink", slice(4, 7), "N m", (0.8, 0.47, 0.65, 1.0)),
@@ -27,7 +27,7 @@ _MAX_PATHS = 60  # drawn paths of frames, per run
 
 
 def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame: str) -> tuple[tuple[str, ...], str]:
-    """Draw the centre of mass and the paths of a frame and of other links that move, those next to the tip first.
+    """Draw the centre of mass, and the paths of a frame and of other moving links, starting near the tip.
 
     Args:
         canvas: Canvas to draw on.
@@ -52,12 +52,12 @@ def draw_paths(canvas: Canvas, stage: Stage, motion: Motion, reach: float, frame
         if name != frame:
             canvas.hide(path)
     off = max(float(np.linalg.norm(path.error)) for path in (com, *paths))  # bounded by that of its coordinates
-    what = "the line is the path of a frame, the yellow ball the centre of mass of what moves"
-    return frames, f"{what}; they are off by at most {1e3 * off:.1g} mm"
+    meaning = "the line is the path of a frame, the yellow ball the centre of mass of the moving links"
+    return frames, f"{meaning}; both are accurate to {1e3 * off:.1g} mm"
 
 
 def draw_stops(canvas: Canvas, stage: Stage, run: TrajectoryData, reach: float) -> list[str]:
-    """Draw a red drum on each joint that comes to a stop, visible while it is there; return notes."""
+    """Draw a red drum on each joint that reaches a stop, visible while it is at the stop; return notes."""
     if run.at_stop is None:
         return []
     notes, numbers = [], {body.joint: number for number, body in enumerate(stage.linkage.bodies)}

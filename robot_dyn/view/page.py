@@ -35,8 +35,8 @@ class ReplayError(RobotDynError):
 class Page:
     """A page of `replay` or `show`, which needs neither server nor network.
 
-    A notebook shows the page as the last value of a cell: in a frame without access to the notebook, or, where frames
-    are removed, as a picture of its first instant. At a prompt, `repr` returns its address.
+    A notebook shows the page if it is the last value of a cell: in a frame without access to the notebook or, where
+    frames are removed, as a picture of its start. At a prompt, `repr` returns its address.
 
     Attributes:
         document: Contents of the page, for its script.
@@ -57,7 +57,7 @@ class Page:
 
     @cached_property
     def address(self) -> str:
-        """Address (file:) of a copy among the temporary files, which is written on first access.
+        """Address (file:) of a copy in a temporary folder, which is written on first access.
 
         Raises:
             ReplayError: If it cannot be written.
@@ -69,7 +69,7 @@ class Page:
         return self.save(folder / "page.html").as_uri()
 
     def save(self, path: str | Path) -> Path:
-        """Write the page as one HTML file, which replaces an older page but no file of another kind.
+        """Write the page as one HTML file; only an older page may be replaced.
 
         Raises:
             ReplayError: If the file cannot be written.
@@ -90,20 +90,20 @@ class Page:
         """Write the run as a video, .mp4 or .gif: frame k shows t = k / fps, by the clock of the page.
 
         An installed Chrome, Chromium or Edge draws it, without a window, a network or an open port; WebGL runs on the
-        processor. Number, times and states of the frames are those of the page; pixels depend on the browser. An
-        existing video of that name is replaced. It needs `pip install 'robot-dyn[video]'`.
+        CPU. Number, times and states of the frames are those of the page; pixels depend on the browser. An existing
+        video of that name is replaced. It needs `pip install 'robot-dyn[video]'`.
 
         Args:
             path: The file.
-            fps: Frames per second, 1 to 240, or to 50 for a .gif. Default 60 for an .mp4, 25 for a .gif.
+            fps: Frames per second, up to 240, or 50 for a .gif. By default 60 for an .mp4 and 25 for a .gif.
             size: Width and height in pixels, even numbers from 160 to 3840.
             dark: True to draw it for dark screens.
-            browser: Path of the browser; the first of this machine if not given.
-            on_progress: Called with the finished part, 0 to 1, and the name of the work, in another thread.
+            browser: Path of the browser; by default the first one installed.
+            on_progress: Called in another thread with the finished fraction, from 0 to 1, and the name of the task.
 
         Raises:
-            VideoError: If the page has no run, the video is too long, no browser is installed or shows the page, or
-                the file cannot be written.
+            VideoError: If the page has no run, the video is too long, no installed browser shows the page, or the
+                file cannot be written.
             MissingExtraError: If playwright or imageio-ffmpeg is not installed.
         """
         from robot_dyn.view.video.video import save_video  # starts no browser
@@ -115,7 +115,7 @@ class Page:
         """Serve the page on this machine only, at the `url` of the returned server, until the server is closed.
 
         Args:
-            port: Port to listen on; any free one if not given.
+            port: Port to listen on; by default any free port.
 
         Raises:
             QueryError: If the port is not a whole number from 1 to 65535.
@@ -130,7 +130,7 @@ class Page:
         return f"<{self._title}: {self.address}>"
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        """Return the page in a frame, its picture, and a line of text, with an address in a terminal only."""
+        """Return the page in a frame, its picture, and a line of text, which has an address only in a terminal."""
         still = b64encode(picture(self.document)).decode()
         text = repr(self) if sys.stdout.isatty() else f"<{self._title}: .address is a page, .save(path) writes it>"
         return {"text/html": self._frame(still), "image/png": still, "text/plain": text}

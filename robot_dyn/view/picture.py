@@ -1,6 +1,6 @@
-"""A still picture of a document's scene at its beginning, for places that show no page: no browser draws it.
+"""A still picture of a document's scene at t = 0, drawn without a browser, for viewers that do not show pages.
 
-Triangles and lines are painted from the farthest to the nearest, seen from the camera of the page; without textures.
+Triangles and lines are painted from far to near, seen from the camera of the page, without textures.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.view.commands import Command
 
-WIDTH, HEIGHT, _FINE = 720, 480, 2  # [pixels]; drawn larger by the last, and reduced: smooth edges
+WIDTH, HEIGHT, _FINE = 720, 480, 2  # [pixels], and the factor by which it is drawn larger for smooth edges
 _TOP, _BOTTOM = (245, 247, 250), (209, 217, 224)  # colours of the page's background
 _HALF = np.tan(np.deg2rad(45.0) / 2)  # half of the height that is seen at a distance of 1, as on the page
-_MARGIN = 0.9  # fraction of the picture, for the scene, same as on the page
+_MARGIN = 0.9  # fraction of the picture that the scene fills, same as on the page
 _LIGHT = np.array([0.4, -0.5, 0.77])
 
 
@@ -53,7 +53,7 @@ def _layers(document: Mapping[str, Any]) -> Iterator[Iterator[Shape]]:
 
 
 def _shapes(drawn: Command, placement: np.ndarray, camera: _Camera) -> Iterator[Shape]:
-    """Return the triangles or lines of an object in front of the camera."""
+    """Yield the triangles or lines of an object in front of the camera."""
     data, look = drawn["geometries"][0]["data"], drawn["materials"][0]
     points = np.reshape(data["attributes"]["position"]["array"], (-1, 3)) @ placement[:3, :3].T + placement[:3, 3]
     base = np.array([look["color"] >> 16, look["color"] >> 8 & 255, look["color"] & 255])

@@ -1,4 +1,4 @@
-"""Show runs of arms, or an arm at rest: pages for a notebook or a browser; q(t) is linear between keyframes."""
+"""Pages that show runs of arms, or an arm at rest, in a notebook or a browser; q(t) is linear between keyframes."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ def replay(
     meshes: Literal["full", "coarse"] = "full",
     names: Sequence[str] | None = None,
 ) -> Page:
-    """Show runs: in a notebook where they stand last in a cell, elsewhere in the browser, at the `address` of the page.
+    """Return a page that shows runs: in a notebook as the last value of a cell, elsewhere in a browser (`address`).
 
-    The page is one text that needs neither server nor network; `serve` of the page serves it live.
+    The page is one text that needs neither server nor network; its method `serve` serves it live.
 
     Args:
         run: The run to show.
-        *ghosts: Runs shown with it, transparent.
+        *ghosts: Runs drawn transparent, for comparison.
         package_dirs: Folders searched first for the packages of meshes.
-        frame: Link whose path is traced.
+        frame: Link whose path is drawn.
         inertia: True to draw each link's equivalent box, of the same mass and inertia.
         meshes: "full", the triangles of their files; or "coarse", fewer, for a smaller page.
         names: Names of the runs in titles and legends; by default robots, files or settings that differ.
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If a run carries no robot, `frame` is not one of its links, or `names` are not different texts, one
-            for each run.
+        QueryError: If a run lacks its robot, `frame` is not one of its links, or `names` are not different texts, one
+            per run.
     """
     return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes, names))
 
@@ -53,13 +53,13 @@ def show(
     inertia: bool = False,
     meshes: Literal["full", "coarse"] = "full",
 ) -> Page:
-    """Show a robot: in a notebook where it stands last in a cell, elsewhere in the browser, at the page's `address`.
+    """Return a page that shows a robot: in a notebook as the last value of a cell, elsewhere at its `address`.
 
-    The page is one text that needs neither server nor network; `serve` of the page serves it live.
+    The page is one text that needs neither server nor network; its method `serve` serves it live.
 
     Args:
         robot: The robot to show.
-        q: Configuration of the robot, (n,), in [rad] or [m]; 0 if not given.
+        q: Configuration of the robot, (n,), in [rad] or [m]; 0 by default.
         package_dirs: Folders searched first for the packages of meshes.
         inertia: True to draw each link's equivalent box, of the same mass and inertia.
         meshes: "full", the triangles of their files; or "coarse", fewer, for a smaller page.
@@ -71,8 +71,8 @@ def show(
 
 
 def _page(document: dict[str, Any]) -> Page:
-    """Return the page of a document; warn once if a part is not drawn as the files describe it."""
+    """Return the page of a document; warn once if a part is not drawn as its files state."""
     if problems := document["problems"]:
         rest = f"; and {len(problems) - 1} more, listed on the page" if len(problems) > 1 else ""
-        warnings.warn(f"drawn otherwise than its files describe: {problems[0]}{rest}", ModelWarning, stacklevel=3)
+        warnings.warn(f"not drawn as its files state: {problems[0]}{rest}", ModelWarning, stacklevel=3)
     return Page(document)

@@ -1,6 +1,6 @@
-"""Rests: the times in which dry friction or a rigid stop holds a joint, from the samples and the events of a run.
+"""Rests: intervals in which dry friction or a rigid stop holds a joint, from the samples and events of a run.
 
-A joint that is held has v = 0 and the same q at two successive times, to the last bit.
+A held joint has v = 0 and exactly the same q at two successive times.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _MAX = 200  # rests of a joint
 
 
 class Rest(NamedTuple):
-    """A time in which a joint is held.
+    """An interval in which a joint is held.
 
     Attributes:
         start, end: Start and end, in [s].
@@ -30,7 +30,7 @@ class Rest(NamedTuple):
 
 
 def rests(run: TrajectoryData) -> tuple[tuple[Rest, ...], ...]:
-    """Return the first rests of each joint, in the order of time; none in a run without effects that hold joints."""
+    """Return the first rests of each joint, by time; () in runs without effects that hold joints."""
     names = run.joint_names
     if not _HOLD & set(run.acting or ()):
         return ((),) * len(names)
@@ -45,7 +45,7 @@ def rests(run: TrajectoryData) -> tuple[tuple[Rest, ...], ...]:
 
 
 def lanes(run: TrajectoryData, prefix: str, most_events: int) -> Iterator[dict[str, Any]]:
-    """Yield the entries `rests` of a page's document: rests and events of each joint that is held for a time."""
+    """Yield the entries `rests` of a page's document: rests and events of each joint that has rests."""
     for name, spans in zip(run.joint_names, rests(run), strict=True):
         if spans:
             events = [(event.t, event.name) for event in run.events if event.joint == name]

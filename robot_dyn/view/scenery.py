@@ -1,6 +1,6 @@
-"""The surroundings of the robots of a page: gravity points down, the floor lies below all, the camera sees all.
+"""The surroundings of the robots of a page: gravity points down, the floor is below, and the camera sees everything.
 
-R g/‖g‖ = −z    the scene is the base turned by the least rotation R that does this
+R g/‖g‖ = −z    the scene is the base rotated by the smallest such R
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _GROUND = (0.7, 0.73, 0.77, 1.0)
 _GRAVITY = (0.42, 0.24, 0.6, 1.0)  # violet
 _CORNER = np.array([0.67, -0.67, 0.32])  # default direction of the camera, from the middle of the scene
 _POINT = 1e-9  # [m], below which nothing has a size
-_FRONTAL = 1.2  # how far it moves to the front of a flat scene
+_FRONTAL = 1.2  # weight of the view from the front for a flat scene
 _OUTWARD = np.array([d for d in product(range(-2, 3), repeat=3) if any(d)], dtype=float)  # directions of an outline
 _ARROW = 0.3  # length of the arrow of gravity, in radii of the scene
-_FLOOR = 1.5  # its half width, in radii of the scene
+_FLOOR = 1.5  # half the width of the floor, in radii of the scene
 
 
 @final
@@ -36,7 +36,7 @@ class Scenery:
         radius: Radius of the sphere, in [m].
         floor: The lowest z, in [m].
         camera: Unit vector from the center to the camera, (3,).
-        outline: The outermost points in some directions, (k, 3), which the camera has in view.
+        outline: The outermost points in some directions, (k, 3), all in the view of the camera.
     """
 
     center: np.ndarray
@@ -52,7 +52,7 @@ class Scenery:
 
     @property
     def aside(self) -> np.ndarray:
-        """A place at the left of the scene, where the arrow of gravity starts, (3,)."""
+        """Start of the arrow of gravity, at the left of the scene, (3,)."""
         left = np.cross(self.camera, [0.0, 0.0, 1.0])
         length = np.linalg.norm(left)
         left = left / length if length > 1e-6 else np.array([-1.0, 0.0, 0.0])  # seen from above
@@ -67,7 +67,7 @@ class Scenery:
 
 
 def scenery(points: np.ndarray) -> Scenery:
-    """Return the scene around points (k, 3); a flat one is seen more from its front."""
+    """Return the scene around points (k, 3); flat scenes are seen more from the front."""
     low, high = points.min(axis=0), points.max(axis=0)
     center = (low + high) / 2
     radius = float(np.linalg.norm(points - center, axis=1).max())
@@ -82,7 +82,7 @@ def scenery(points: np.ndarray) -> Scenery:
 
 
 def upright(gravity: tuple[float, float, float]) -> np.ndarray:
-    """Return the smallest rotation (3, 3) that turns gravity to −z; the identity without gravity."""
+    """Return the smallest rotation (3, 3) that rotates gravity to −z; the identity without gravity."""
     from scipy.spatial.transform import Rotation
 
     size = float(np.linalg.norm(gravity))
@@ -92,7 +92,7 @@ def upright(gravity: tuple[float, float, float]) -> np.ndarray:
 
 
 def surround(canvas: Canvas, seen: Scenery, gravity: tuple[float, float, float]) -> None:
-    """Draw squares on the floor, and an arrow down at the left of the scene; none without gravity."""
+    """Draw squares on the floor and, if there is gravity, an arrow down at the left of the scene."""
     middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(_FLOOR * seen.radius / seen.square))
     ticks = np.arange(-count, count + 1)
     x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")  # each edge is a line: viewers drop lines behind the camera
@@ -119,4 +119,4 @@ def turned(gravity: tuple[float, float, float]) -> list[str]:
         return ["gravity is zero; up is z of the base"]
     if np.array_equal(upright(gravity), np.eye(3)):
         return []
-    return [f"the scene is turned so that gravity, {gravity} m/s² in axes of the base, points down"]
+    return [f"the scene is rotated so that gravity, {gravity} m/s² in base axes, points down"]

@@ -2,8 +2,8 @@
 
 Ledger: E(t) − E(0) = Σ W_k + residual.
 
-Long runs are thinned: of each bucket of samples the least and the largest of each column stay, so no peak is lost.
-A plot whose curves are all 0, or all absent, has no series; the reason is stated.
+Long runs are thinned to the smallest and largest value of each column in each bucket of samples, so no peak is lost.
+A plot whose curves are all 0, or all missing, has no series but a reason.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 Columns = dict[str, np.ndarray]  # by name
 
-_BUCKETS = 2000  # no plot is wider in pixels of a screen
+_BUCKETS = 2000  # more than the pixels of any plot
 _MAX = 1e38  # largest number in single precision
 _UNSTATED = 1e300  # a limit of this size means none
 
 
 class Curve(NamedTuple):
-    """Values over times t, both (m,), of a run, or of a ghost; the mark after the name is that of the run."""
+    """Values over times t, both (m,), of a run or a ghost; `mark` follows the name and identifies the run."""
 
     name: str
     t: np.ndarray
@@ -42,9 +42,9 @@ class Curve(NamedTuple):
 
 
 def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> list[dict[str, Any]]:
-    """Return title, unit, times, series and limits of each plot, and why it has none.
+    """Return title, unit, times, series and limits of each plot, or the reason why it has no series.
 
-    A series has one colour in the run and its ghosts; desired positions and velocities have that of the joint.
+    A series has the same colour in the run and its ghosts; desired positions and velocities have that of the joint.
     """
     types = {"revolute" if body.revolute else "prismatic" for stage in stages for body in stage.linkage.bodies}
     kind = types.pop() if len(types) == 1 else None
@@ -81,12 +81,12 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
 
 
 def effort_limits(run: TrajectoryData, stated: np.ndarray) -> np.ndarray:
-    """Return the effort limit of each joint that acted in a run, and where none did that of the file, (n,).
+    """Return the effort limit of each joint that acted in a run, otherwise that of the file, (n,).
 
-    Limits act by an `EffortLimit` of the plant and by that of a PID; the smaller one counts.
+    Limits of an `EffortLimit` of the plant and of a PID act; the smaller one counts.
 
     Args:
-        run: The run, whose settings hold the limits as texts, such as "15, inf N m".
+        run: The run, whose settings contain the limits as texts, such as "15, inf N m".
         stated: Limits of the file, (n,).
     """
     acting = np.full(len(stated), np.inf)
@@ -101,7 +101,7 @@ def _by_joint(run: TrajectoryData, x: np.ndarray) -> Columns:
 
 
 def _desired(run: TrajectoryData, first: TrajectoryData, field: str) -> Columns:
-    """Return the desired values of a run; none if they equal those of the first run."""
+    """Return the desired values of a run; {} if they equal those of the first run."""
     x, of_first = getattr(run, field), getattr(first, field)
     again = run is not first and of_first is not None and np.array_equal(x, of_first)
     return {} if x is None or again else _by_joint(run, x)
@@ -126,22 +126,22 @@ def _energy(run: TrajectoryData) -> Columns:
 
 
 def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
-    """Return the positions of a run minus those of the first, and the time at which they part."""
+    """Return the positions of a run minus those of the first, and the time at which they diverge."""
     found = difference(a, b)
     if found.parted_s is not None:
         at = f": they part at t = {found.parted_s:.4g} s"
     elif found.is_conclusive:
         at = ": they do not part"
     else:
-        at = f": compared over {found.fraction:.0%} of the time only; record both at the same times"
+        at = f": compared over only {found.fraction:.0%} of the time; record both at the same times"
     curves = [Curve(name, found.t, x) for name, x in zip(found.joint_names, found.q.T, strict=True)]
     return _plot(f"difference of q, {of_b} − {of_a}{at}", of_q, curves)
 
 
 def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
-    """Return a plot of curves at the times that thinning keeps for at least one of them; nan after the end of a run.
+    """Return a plot of curves at the times that thinning keeps for any of them; nan after the end of a run.
 
-    Curves of one name, such as those of a joint in several runs, follow each other, also in the legend.
+    Curves with the same name, such as those of a joint in several runs, are adjacent, also in the legend.
     """
     curves = [curve for curve in curves if len(curve.t)]
     t = np.unique(np.concatenate([np.zeros(0), *(curve.t[thinned(curve.values[:, None])] for curve in curves)]))
@@ -165,10 +165,10 @@ def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
 
 
 def _limits(names: Sequence[str], lower: np.ndarray, upper: np.ndarray, curves: list[Curve]) -> dict[str, Any]:
-    """Return the limits to draw, which are near the curve of their joint, and the others in words.
+    """Return the limits to draw, which are near the curve of their joint, and the others as text.
 
-    Near is within 1.5 times the largest value of its joint, or within a tenth of the height of all curves; and within
-    half this height, so that no limit makes the curves much flatter.
+    Near means within 1.5 times the largest value of the joint, or within a tenth of the height of all curves; and
+    within half this height, so that no limit flattens the curves much.
     """
     every = _finite(curves)
     if not every.any():
@@ -192,7 +192,7 @@ def _finite(curves: list[Curve]) -> np.ndarray:
 
 
 def _in_words(beyond: dict[float, list[str]]) -> str:
-    """Return joints and their limits in words, lower … upper, or ± if they differ in sign only."""
+    """Return joints and their limits as text: lower … upper, or ± if they differ only in sign."""
     of: dict[tuple[str, ...], list[float]] = {}
     for value, names in beyond.items():
         of.setdefault(tuple(names), []).append(value)

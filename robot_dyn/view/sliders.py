@@ -1,4 +1,4 @@
-"""The numbers by which a page moves an arm and computes its gravity torque: joints, bodies and couplings.
+"""The numbers with which a page moves an arm and computes its gravity torque: joints, bodies and couplings.
 
 The recursions are in `web/sliders.js`, in double precision: g = Π gᵢ exp(ξ̂ᵢ qᵢ) and τ = Sᵀ ∂V/∂q_full, from the mass
 and the first moment that each joint carries. [Murray, Li, Sastry 1994, ch. 3 and 4]
@@ -15,11 +15,11 @@ from robot_dyn.foundations.spatial import first_moment
 from robot_dyn.queries.units import unit
 from robot_dyn.view.stage import Stage
 
-_TURN, _SLIDE = pi, 1.0  # [rad], [m]; how far a joint without limits can be moved
+_TURN, _SLIDE = pi, 1.0  # [rad], [m]; range of sliders of joints without limits
 
 
 def sliders(stage: Stage, q: np.ndarray) -> dict[str, Any]:
-    """Return the entry `sliders` of the document of a robot that is shown at q (n,)."""
+    """Return the entry `sliders` of the document of a robot shown at q (n,)."""
     robot, linkage = stage.robot, stage.linkage
     of_joints = zip(robot.joint_names, robot.joint_types, q, robot.lower, robot.upper, robot.effort_limit, strict=True)
     of_bodies = zip(linkage.bodies, linkage.inertias, stage.paths, strict=True)

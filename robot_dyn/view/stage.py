@@ -1,7 +1,7 @@
-"""The stage: a robot as a tree of nodes, one a joint, each moved by its own track: g_parent,i(q) = gᵢ exp(ξ̂ᵢ qᵢ).
+"""The stage: a robot as a tree of nodes, one per joint, each moved by its own track: g_parent,i(q) = gᵢ exp(ξ̂ᵢ qᵢ).
 
-A node turns or slides in its parent, as in the product of exponentials, so that what the viewer draws between two
-keyframes is the arm at the q between them. [Murray, Li, Sastry 1994, ch. 3 §2]
+A node rotates or slides in its parent, as in the product of exponentials, so that between two keyframes the viewer
+draws the arm at an intermediate q. [Murray, Li, Sastry 1994, ch. 3 §2]
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from robot_dyn.view.geometry.visuals import Drawing, Piece
 from robot_dyn.view.keyframes import Keyframes
 
 Placements = Mapping[int, tuple[np.ndarray, np.ndarray]]  # (R, p) in the base, by body
-_CHUNK = 20_000  # samples whose placements are held at a time
+_CHUNK = 20_000  # samples whose placements are in memory at a time
 
 
 @final
 @dataclass(frozen=True)
 class Stage:
-    """The places of the parts of a robot in the viewer's tree.
+    """The nodes of a robot in the viewer's tree.
 
     Attributes:
         root: Path of the robot.
@@ -68,7 +68,7 @@ class Stage:
         return f"{self.root if body == BASE else self.paths[body]}/link {plain(link)}"
 
     def draw(self, canvas: Canvas, look: Drawing, keys: Keyframes, shows_boxes: bool) -> None:
-        """Draw the robot, as it moves by keyframes, with its boxes of inertia, shown or not."""
+        """Draw the robot, moved by keyframes, with its inertia boxes, visible or not."""
         for link, (_, pose, _) in self.linkage.links.items():
             canvas.place(self.link_path(link), homogeneous(pose.R, pose.p))
         pieces = [("", number, piece) for number, piece in enumerate(look.pieces)]
@@ -93,7 +93,7 @@ class Stage:
         return self._over(q, origins)
 
     def centre_of_mass(self, q: np.ndarray) -> np.ndarray:
-        """Return the centre of mass of the bodies that move, in the base, (m, 3): Σ mᵢ pᵢ / Σ mᵢ."""
+        """Return the centre of mass of the moving bodies, in the base, (m, 3): Σ mᵢ pᵢ / Σ mᵢ."""
 
         def middle(at: Placements, m: int) -> np.ndarray:
             total, mass = np.zeros((m, 3)), 0.0
@@ -120,7 +120,7 @@ class Stage:
 
     @cached_property
     def tip(self) -> str:
-        """The link at the end of the longest chain of joints, and of those the farthest from its joint."""
+        """Link at the end of the longest chain of joints; among several, the one farthest from its joint."""
 
         def reach(link: str) -> tuple[int, float]:
             body, pose, _ = self.linkage.links[link]

@@ -16,7 +16,7 @@ _MAX_SETTINGS = 60
 
 
 def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
-    """Return the settings in which runs differ from the first; no rows if the runs are not of one robot."""
+    """Return the settings in which runs differ from the first; no rows if the robots differ."""
     first, *others = (run for _, run in named)
     if any(not comparable(first, other) for other in others):
         return {"runs": [], "rows": []}
@@ -25,7 +25,7 @@ def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any
 
 
 def cost_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
-    """Return the run names and the rows, each a heading and one text per run; empty rows are left out."""
+    """Return the names of the runs, and rows with a heading and one text per run; empty rows are omitted."""
     columns = [dict(_rows(run)) for _, run in named]
     headings = dict.fromkeys(heading for column in columns for heading in column)
     rows = [[heading, *(column.get(heading, _NONE) for column in columns)] for heading in headings]

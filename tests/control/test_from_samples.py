@@ -103,7 +103,7 @@ def test_samples_that_move_at_an_end_need_a_word() -> None:
     """A stop within one step would take a torque that the motion does not need."""
     with pytest.raises(PlanError, match=r"moves at .* rad/s at the start.*give ends='measured'.*ends='rest'"):
         rd.control.from_samples(ARM, table(SMOOTH))
-    with pytest.raises(PlanError, match=r"at the end of the samples: choose"):
+    with pytest.raises(PlanError, match=r"at the end of the samples; give"):
         rd.control.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
     assert rd.control.from_samples(ARM, REST[::20], time=T[::20]).duration_s == 2.0  # way points are few
 

@@ -199,8 +199,8 @@ LOG = dict(zip(("t", "q", "v", "tau"), smooth_log(m=11), strict=True))
         ({"bandwidth_rad_s": 0.0}, "bandwidth_rad_s must be above 0|bandwidth_rad_s"),
         ({"effects": 3.0}, "effects"),
         ({"effects": lambda q, v: -v[0]}, r"effects\(q, v\) must have shape \(11, 2\)"),
-        ({"held": 1}, "held"),
-        ({"rest_s": (5.0, 6.0)}, "rest_s: 0 samples"),
+        ({"zero_order_hold": 1}, "zero_order_hold"),
+        ({"rest_s": (5.0, 6.0)}, "rest_s: only 0 samples"),
         ({"rest_s": (0.0, 2.0)}, "rest_s: a joint moves by"),
     ],
 )

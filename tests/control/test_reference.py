@@ -243,7 +243,7 @@ def test_references_are_copied_and_frozen() -> None:
         (lambda: circle(Q0, 1.0, [0, 0, 1], 1.0, toward=[0, 0, 2]), "toward, in the plane of the circle, must not"),
         (lambda: circle(Q0, -1.0, [0, 0, 1], 1.0), "radius must be positive"),
         (lambda: CartesianReference(hold([1.0])), "position must be"),
-        (lambda: CartesianReference(hold(Q0), angle=hold([1.0])), "needs a rotation"),
+        (lambda: CartesianReference(hold(Q0), angle=hold([1.0])), "needs an initial orientation, rotation"),
     ],
 )
 def test_references_without_meaning_are_refused(make, message: str) -> None:

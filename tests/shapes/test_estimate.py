@@ -233,7 +233,7 @@ def test_the_corrected_file_of_the_doctor_is_the_robot_that_is_loaded(tmp_path: 
         ({"total_mass": 0.0}, "total_mass must be positive"),
         ({"total_mass": 3.0}, "does not exceed the 3.1 kg"),
         ({"density": -1.0}, "density must be positive"),
-        ({"total_mass": 9.0, "density": 900.0}, "contradict each other"),
+        ({"total_mass": 9.0, "density": 900.0}, "exclude each other"),
     ],
 )  # fmt: skip
 def test_masses_that_say_nothing_are_refused(tmp_path: Path, masses: dict[str, object], message: str) -> None:

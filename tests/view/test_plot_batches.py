@@ -145,7 +145,7 @@ def test_all_parts_fit_a_page_and_are_named(some_lost, tmp_path) -> None:
 def test_names_that_are_not_there_are_refused(runs, names: list[str], options: dict, text: str) -> None:
     with pytest.raises(QueryError, match=text):
         plot(runs, *names, **options)
-    with pytest.raises(QueryError, match="x and y name columns of rollouts"):
+    with pytest.raises(QueryError, match="x and y are columns of rollouts"):
         plot(cart_pole(), x="t")
 
 

@@ -445,4 +445,4 @@ def test_many_remarks_leave_room_for_the_curves(run) -> None:
         run, outcome=Outcome(Reason.CANNOT_EVALUATE, run.outcome.t, facts={"error": "use a smaller step, " * 90})
     )
     figure = plot(long)
-    assert figure.get_size_inches()[1] * MM <= 297 and "the summary has all remarks" in headings(figure)
+    assert figure.get_size_inches()[1] * MM <= 297 and "see the summary for all remarks" in headings(figure)

@@ -334,7 +334,7 @@ def test_file_of_a_lost_package_is_found_above_the_urdf(tmp_path: Path) -> None:
     stl(tmp_path / "meshes" / "a.stl")
     here = drawn(urdf(2 * mesh_visual("package://lost/meshes/a.stl")), tmp_path / "urdf" / "arms")
     assert (here.notes, len(here.pieces)) == ((), 2)
-    assert here.remarks == (f"package 'lost' is not found; its files are taken from {tmp_path.name!r} above the URDF",)
+    assert here.remarks == (f"package 'lost' is not found; its files are read from {tmp_path.name!r} above the URDF",)
     here = drawn(urdf(mesh_visual("package://lost/../meshes/a.stl")), tmp_path / "urdf")
     assert "package_dirs" in here.notes[0]
 

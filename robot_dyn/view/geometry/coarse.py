@@ -20,7 +20,7 @@ CELLS = 32  # cells along the longest side of a mesh
 
 
 def coarse(mesh: Mesh) -> Mesh:
-    """Return the mesh with the corners in each cubic cell at their mean, without the triangles that collapse.
+    """Return the mesh with the corners in each cubic cell merged at their mean, without collapsed triangles.
 
     No corner moves by more than the diagonal of a cell, √3 / `CELLS` of the longest side.
     """
@@ -34,7 +34,7 @@ def coarse(mesh: Mesh) -> Mesh:
 
 
 def look_of(robot: Robot, package_dirs: Iterable[str | Path], inertia: bool, meshes: str) -> Drawing:
-    """Return the drawing of a robot, with the meshes of its files or coarse ones."""
+    """Return the drawing of a robot with the meshes of its files, or with coarse ones."""
     choice("meshes", meshes, ("full", "coarse"))
     look = drawing(robot, package_dirs, inertia=inertia)
     return look if meshes == "full" else _coarsened(look)

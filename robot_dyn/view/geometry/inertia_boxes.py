@@ -28,8 +28,8 @@ _POINT, _LARGEST = 1e-6, 1e6  # [m]: shorter edges belong to a point mass; the l
 def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None]]:
     """Yield link, pose in the link (4, 4), uniform box and doubt of each body that moves and has mass.
 
-    The bodies are those of the dynamics: with payloads, and with all links fixed to them. Moments that no body can
-    have would need an edge of negative square, drawn thin. A box far beyond the robot is drawn as long as the
+    Bodies are those of the dynamics: they include payloads and all links fixed to them. For impossible moments, the
+    square of an edge is negative; this edge is drawn thin. A box far larger than the robot is drawn as long as the
     robot's longest link.
     """
     stated = structure_of(robot.description, robot.edits)
@@ -44,7 +44,7 @@ def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None
             if doubt:
                 doubt = f"{doubt}; drawn thin"
             elif radius := stated.radius_beyond_reach(body.mass, body.inertia):
-                doubt = f"its inertia is that of a mass {radius:.3g} m and more away; drawn smaller"
+                doubt = f"its inertia needs mass at least {radius:.3g} m from the centre; drawn smaller"
                 edges = edges * (stated.longest_link / edges.max())
             yield frame.name, homogeneous(axes, np.array(body.lever)), box(*edges), doubt
 

@@ -1,4 +1,4 @@
-"""Shapes computed from numbers: box, cylinder, ellipsoid, arrow; curved ones turn a profile (r, z) about the z axis."""
+"""Meshes of a box, cylinder, ellipsoid and arrow; curved ones are profiles (r, z) revolved about the z axis."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def arrow(length: float) -> Mesh:
 
 
 def _revolved(profile: Any, stretch: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
-    """Return the surface of an upward profile (r, z) turned about z; it is smooth up to `CREASE`."""
+    """Return the surface of an upward profile (r, z) revolved about z; it is smooth up to `CREASE`."""
     r, z = np.asarray(profile, dtype=float).T
     r = np.where(r < 1e-12 * np.abs(r).max(), 0.0, r)
     turn = 2 * pi * np.arange(_SEGMENTS + 1) / _SEGMENTS

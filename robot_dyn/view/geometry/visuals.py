@@ -1,6 +1,6 @@
 """The appearance of a robot: every <visual> of its URDF as pieces of triangles fastened to links.
 
-A piece stands at g_link · pose. A note reports a visual that cannot be drawn as described, and its replacement: the
+A piece is placed at g_link · pose. A note reports a visual that cannot be drawn as described, and its replacement: the
 collision shape of the link, otherwise the ellipsoid of its inertia.
 """
 
@@ -62,7 +62,7 @@ class Piece:
 @final
 @dataclass(frozen=True)
 class Drawing:
-    """The look of a robot.
+    """The appearance of a robot.
 
     Attributes:
         pieces: Pieces of the drawing.
@@ -85,12 +85,12 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
     """Return the pieces of every visual of a robot whose mesh files can be found.
 
     Args:
-        robot: The robot; its edits do not change its look.
+        robot: The robot; edits do not change its appearance.
         package_dirs: Searched first; then folders above the file, ROS_PACKAGE_PATH, the installed example-robot-data.
-        inertia: True if inertia boxes are shown; a note then lists the boxes that are not as described.
+        inertia: True if inertia boxes are shown; notes then report boxes that are not drawn as described.
 
     Returns:
-        Pieces and notes; a mesh that is missing or damaged is noted and replaced, not raised.
+        Pieces and notes; missing and damaged meshes are replaced and noted, and do not raise errors.
     """
     artist = _Artist(robot, package_dirs)
     pieces = artist.upright(artist.robot_pieces)
@@ -116,7 +116,7 @@ def solids(
         robot: The robot.
         package_dirs: See `drawing`.
         kinds: The elements, in this order.
-        links: Names of links; all of them if not given.
+        links: Names of links; by default all.
     """
     artist = _Artist(robot, package_dirs, as_written)
     found = artist.upright(lambda: artist.link_solids(kinds, links))
@@ -161,7 +161,7 @@ class _Artist:
         return [(name, link) for name, link in named if name in self.checked]
 
     def upright(self, draw: Callable[[], T]) -> T:
-        """Return a drawing; draw again if files with y up, turned or not, stand nearer to masses the other way."""
+        """Return a drawing; redraw with the other up axis if meshes of files with y up are then nearer to masses."""
         drawn = draw()
         wrong = frozenset(kind for kind in _Y_UP_REMARKS if self._nearer_the_other_way(kind))
         if not wrong:

@@ -1,4 +1,4 @@
-"""The parts of figures of a batch: quantiles over time, outcomes, a figure of the runs, and that over a parameter.
+"""The parts of figures of a batch: quantiles over time, outcomes, and a number per run, also over a parameter.
 
 Bands show the runs that did not diverge; the others are drawn separately and counted.
 """
@@ -25,13 +25,13 @@ from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MAX_LINES = 100  # drawn runs that diverged
-_CELL_MM = 42.0  # the least width of a cell
+_CELL_MM = 42.0  # minimum width of a cell
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class BatchView:
-    """A batch, the columns of its joints that are shown, what a histogram and a scatter show, and the width [mm]."""
+    """A batch, the columns of the shown joints, the columns of histogram and scatter, and the width in [mm]."""
 
     runs: RolloutsData
     joints: tuple[int, ...]
@@ -41,7 +41,7 @@ class BatchView:
 
     @property
     def lost(self) -> str:
-        """The number of diverged runs as the end of a heading; empty if there are none."""
+        """Number of diverged runs, as the end of a heading; empty if there are none."""
         count = int(self.runs.diverged.sum())
         return f"; {count} of {len(self.runs)} diverged" if count else ""
 
@@ -49,7 +49,7 @@ class BatchView:
 @final
 @dataclass(frozen=True, eq=False)
 class Bars(Axes):
-    """Counts between `edges`; `lost` for the diverged runs, next to them. Without edges each count has a name."""
+    """Counts between `edges`, and next to them `lost`, the diverged runs. Without edges each count is named."""
 
     counts: np.ndarray
     edges: np.ndarray | None = None
@@ -85,7 +85,7 @@ def fan(view: BatchView) -> list[Panel]:
         PlotError: If q was not recorded.
     """
     if view.runs.q is None:
-        raise PlotError("the positions of the runs were not recorded; add q to record of rollouts")
+        raise PlotError('positions were not recorded; add "q" to record= of rollouts')
     kinds = joint_types(view.runs)
     names = [(view.runs.joint_names[i], f"q [{unit('q', kinds[i])}]") for i in view.joints]
     return [_fans(view, "Positions", names, view.runs.q[:, :, list(view.joints)])]
@@ -126,7 +126,7 @@ def outcomes(view: BatchView) -> list[Panel]:
 
 
 def histogram(view: BatchView) -> list[Panel]:
-    """Return the histogram of a figure of the runs; by default the rms tracking error, else the first extreme."""
+    """Return the histogram of a number per run; by default the rms tracking error, otherwise the first extreme."""
     name, values = _column(view.runs, "y", view.y, ("rms tracking error", "largest", "ended"))
     some = np.isfinite(values) & ~view.runs.diverged
     if not some.any():
@@ -137,7 +137,7 @@ def histogram(view: BatchView) -> list[Panel]:
 
 
 def scatter(view: BatchView) -> list[Panel]:
-    """Return a scatter of a figure of the runs over a varied parameter, by default the first column that differs.
+    """Return a scatter of a number per run over a varied parameter, by default the first column that differs.
 
     Raises:
         PlotError: If nothing differs from run to run.
@@ -159,7 +159,7 @@ BATCH_PLOTS: Mapping[str, Callable[[BatchView], list[Panel]]] = MappingProxyType
 )
 
 
-def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.ndarray) -> Panel:
+def _fans(view: BatchView, quantity: str, names: list[tuple[str, str]], values: np.ndarray) -> Panel:
     """Return a panel with the quantiles of each column of values (B, m, c)."""
     t, gone = view.runs.t, view.runs.diverged
     cells = []
@@ -175,14 +175,14 @@ def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.n
         cells.append(Cell(name, TIME, y, (Curve("median", t, median), *lines), bands=shades, lost=ends))
     rows = in_rows(cells, int(view.width / _CELL_MM))
     early = int(((view.runs.ended_s < t[-1]) & ~gone).sum())
-    counted = f"; {early} ended early, bands are of those still running" if early else ""
+    counted = f"; {early} ended early: bands include only runs still in progress" if early else ""
     many = f", {_MAX_LINES} of them drawn" if gone.sum() > _MAX_LINES else ""
-    return Panel(f"{what} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows)
+    return Panel(f"{quantity} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows)
 
 
 def _title(view: BatchView, some: np.ndarray) -> str:
     missing = int((~some & ~view.runs.diverged).sum())
-    return f"{int(some.sum())} runs{view.lost}" + (f"; {missing} without this figure" if missing else "")
+    return f"{int(some.sum())} runs{view.lost}" + (f"; {missing} without this value" if missing else "")
 
 
 def _column(runs: RolloutsData, option: str, name: str | None, preferred: tuple[str, ...]) -> tuple[str, np.ndarray]:

@@ -1,6 +1,6 @@
-"""Cells of a figure: one pair of axes each, with curves, limits, marks and scales, in the style of a figure.
+"""Cells of a figure: one pair of axes each, with curves, limits, marks and scales, in the style of the figure.
 
-Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and next to other figures.
+No global state is set, neither pyplot nor rcParams, so figures can be drawn in any thread and do not affect others.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from robot_dyn.foundations.display import drawable
 from robot_dyn.view.rests import Rest
 from robot_dyn.view.series import thinned
 
-_WILD = 1e3  # times its usual size: what grew beyond it while a run diverged needs a logarithm
-NEAR = 0.2  # fraction of its effort limit: a torque that stays below is drawn without it
+_WILD = 1e3  # times the usual size: values of a diverging run beyond it need a logarithmic scale
+NEAR = 0.2  # fraction of the effort limit: for smaller torques the limit is not drawn
 _MAX_MARKS = 200  # in a cell
 _LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
 _PIXELS = 1000  # across a cell
@@ -30,7 +30,7 @@ _GREYS = {"paper": "#ffffff", "ink": "#000000", "grid": "#e4e4e4", "veil": "#eee
     "lines": ("#000000", "#d55e00", "#0072b2", "#8c8c8c", "#009e73", "#e69f00", "#56b4e9")
 }
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)))
-LOST = 1  # colour of what diverged, and of a rest at a stop
+LOST = 1  # colour of diverged runs, and of rests at a stop
 TIME = "t [s]"
 DESIRED = 1, 1  # colour and dashes of desired values
 
@@ -61,7 +61,7 @@ class Style:
 
 
 PAPER = Style(_GREYS, heading=8.0, small=7.5, line=0.8, titled=False)
-"""For a page of a paper: black and dashes first, thin lines, no title, since its caption is text."""
+"""For papers: black and dashes first, thin lines, and no title, because papers have captions."""
 
 
 @final
@@ -70,8 +70,8 @@ class Curve:
     """y over x, both (m,).
 
     Attributes:
-        label: Name in the legend; a name that begins with _ has no entry.
-        style: Numbers of its colour and its dashes.
+        label: Name in the legend; names that begin with _ have no entry.
+        style: Indices of its colour and its dashes.
         dots: True to draw points without a line.
         is_scaled: True if the axes are scaled to show it.
     """
@@ -92,7 +92,7 @@ class Axes:
         title: Text above them.
         x, y: Names of the axes, with their units.
         note: Text after the title.
-        own_legend: True if the curves are named under the title, because no other cell has the same curves.
+        own_legend: True if the legend is below the title, because no other cell has the same curves.
     """
 
     title: str
@@ -109,17 +109,17 @@ class Axes:
 @final
 @dataclass(frozen=True, eq=False)
 class Cell(Axes):
-    """Curves and what explains them.
+    """Curves with limits, marks, rests and bands.
 
     Attributes:
         curves: Curves; over time unless `x` names another quantity.
         log: True if y has a logarithmic scale.
-        limit: Drawn at ±limit.
-        until: Time after which the cell is veiled.
-        marks: Times of events, dotted.
-        rests: Shaded, those at a stop in colour.
+        limit: Limit, drawn at ±limit.
+        until: Time after which the cell is shaded.
+        marks: Times of events, drawn as dotted lines.
+        rests: Intervals at rest, shaded; those at a stop in colour.
         bands: Label, lower and upper edge over the x of the first curve, and opacity.
-        lost: x of runs that diverged, crosses at the upper edge.
+        lost: x of runs that diverged, drawn as crosses at the upper edge.
     """
 
     curves: tuple[Curve, ...]
@@ -134,7 +134,7 @@ class Cell(Axes):
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw the curves, limits and scales."""
         theme, colours = style.colours, style.colours["lines"]
-        log = self.log and any(np.any(curve.y > 0) for curve in self.curves)  # zero has no logarithm
+        log = self.log and any(np.any(curve.y > 0) for curve in self.curves)
         for curve in self.curves:
             self._draw(curve, axes, style, log)
         first = self.curves[0].x
@@ -202,13 +202,13 @@ def scale(
     log: bool = False,
     counts: bool = True,
 ) -> None:
-    """Set bounds that show all finite values, and as many numbers as there is room for.
+    """Set bounds that include all finite values, and as many tick labels as fit.
 
     Args:
         axes: Axes of Matplotlib.
         side: "x" or "y".
         z: Values.
-        limit: Shown at ±limit too, unless the curve would be flat between such far lines.
+        limit: Limit to include at ±limit, unless this would flatten the curve.
         diverged: True if values may have grown without bound.
         log: True if the scale is logarithmic.
         counts: True to label whole numbers only, if all values are whole numbers.
@@ -241,14 +241,14 @@ def scale(
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=whole))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda x, _: _tick(x, max(map(abs, bounds)) < 0.01)))
-    if side == "x" and axis.get_scale() == "linear":  # numbers side by side have a factor in common, to be short
+    if side == "x" and axis.get_scale() == "linear":  # a common factor shortens the labels
         axis.set_major_formatter(ScalarFormatter(useOffset=False))
         axes.ticklabel_format(axis="x", scilimits=(-2, 5))
     getattr(axes, f"set_{side}lim")(*np.clip(bounds, -_LARGEST, _LARGEST))
 
 
 def _tick(x: float, is_small: bool) -> str:
-    """Return a number at an axis: as 5e−4 where numbers are small, otherwise with up to five digits."""
+    """Return a tick label: such as 5e−4 if numbers are small, otherwise with up to five digits."""
     scientific = x and (is_small or not 1e-4 <= abs(x) < 1e5)
     if not scientific:
         return f"{x:.5g}".replace("-", "−")
@@ -257,9 +257,9 @@ def _tick(x: float, is_small: bool) -> str:
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return which samples of a long curve to draw: the least and the largest of each pixel of a rising x.
+    """Return the samples of a long curve to draw: the smallest and largest in each pixel of an increasing x.
 
-    Where x turns, as in a phase portrait, they are those that reach another pixel.
+    Where x reverses, as in a phase portrait, samples that reach another pixel are drawn.
     """
     if len(y) <= 4 * _PIXELS or np.all(x[1:] >= x[:-1]):
         return thinned(y[:, None], _PIXELS)
@@ -274,5 +274,5 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def shortened(name: str, most: int) -> str:
-    """Return a name cut in its middle, because names of one robot differ at their ends."""
+    """Return a name shortened in the middle, because names of one robot differ at their ends."""
     return name if len(name) <= most else f"{name[: most // 2]}…{name[len(name) - (most - 1) // 2 :]}"

@@ -20,7 +20,7 @@ from robot_dyn.view.plots.pictures import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 from robot_dyn.view.rests import Rest, rests
 
-_CELL_MM, _WIDE_MM = 36.0, 60.0  # the least width of a cell, and of one with a long title
+_CELL_MM, _WIDE_MM = 36.0, 60.0  # minimum width of a cell, and of one with a long title
 
 
 @final
@@ -29,9 +29,9 @@ class View:
     """The shown part of a run, and the width of the figure.
 
     Attributes:
-        run: The whole.
+        run: The whole run.
         joints: Columns of the joints shown.
-        types: Type of each joint of the run; None where it is not known.
+        types: Type of each joint of the run; None if unknown.
         efforts, speeds: Limits of u and v of each joint of the run, in SI units; inf for none.
         width: Width of the figure, in [mm].
     """
@@ -59,7 +59,7 @@ class View:
 
 
 def overview(view: View) -> list[Panel]:
-    """Return a row for each joint: q, u, tracking error and v, if known and if they fit; energy and errors below."""
+    """Return a row per joint with q, u, tracking error and v, as far as recorded; below, energy and errors."""
     run, held = view.run, rests(view.run)
     known = {"q": _position}
     known |= {"u": _torque} if np.nan_to_num(run.u).any() else {}
@@ -95,13 +95,13 @@ def joints(view: View) -> list[Panel]:
 
 
 def torques(view: View) -> list[Panel]:
-    """Return the actuation of each joint with ± its effort limit, and the fraction used, also between samples.
+    """Return the actuation of each joint with ± its effort limit, and the largest fraction of it at any step.
 
     Raises:
         PlotError: If it was not recorded.
     """
     if np.isnan(view.run.u).all():
-        raise PlotError("the torques of the run were not recorded; add u to record of rollouts")
+        raise PlotError('torques were not recorded; add "u" to record= of rollouts')
     cells = [_torque(view, i) for i in view.joints]
     return [Panel(f"Actuation{_limits(view, u=view.efforts)}", in_rows(cells, view.columns))]
 
@@ -114,7 +114,7 @@ def energy(view: View) -> list[Panel]:
     """
     ledger = view.run.ledger
     if not ledger.is_recorded:
-        raise PlotError("energy and work of the run were not recorded; add energy and work to record of rollouts")
+        raise PlotError('energy and work were not recorded; add "energy" and "work" to record= of rollouts')
     known = np.isfinite(ledger.residual).any() and np.isfinite(ledger.exchanged)
     part = f": the residual is {ledger.closure:.1e} of the exchanged energy" if known and ledger.exchanges else ""
     rows = in_rows(_ledger(view), 1)
@@ -130,7 +130,7 @@ def tracking(view: View) -> list[Panel]:
     run = view.run
     if run.tracking_error is None:
         raise PlotError(
-            "the run has no tracking error, because it followed no reference; simulate with a controller that has one"
+            "the run has no tracking error, because it has no reference; simulate it with a controller that has one"
         )
     if run.desired is None:
         columns, units = [0, 1, 2], ["m"] * 3
@@ -210,7 +210,7 @@ def _ledger(view: View) -> list[Cell]:
     E, V = ledger.energy, ledger.potential
     own = (("K", ledger.kinetic), ("V − V(0)", V - V[0]), ("E − E(0)", E - E[0]))
     stores = tuple(Curve(label, t, y, (i, i)) for i, (label, y) in enumerate(own))
-    works = tuple(  # the dashes of a colour that comes again are others
+    works = tuple(  # repeated colours have other dashes
         Curve(f"W {name}", t, y, (k, k - 3 + 2 * (k // 7))) for k, (name, y) in enumerate(ledger.work.items(), 3)
     )
     sole = f" by {next(iter(ledger.work))}" if len(works) == 1 else ""
@@ -234,7 +234,7 @@ def _marks(run: TrajectoryData, i: int) -> tuple[float, ...]:
 
 
 def _legend(view: View, held: tuple[tuple[Rest, ...], ...]) -> str:
-    """Return the legend of marks without an entry in the legend, for a heading."""
+    """Return, for a heading, the meaning of marks that are not in the legend."""
     run, shown = view.run, [rest for i in view.joints for rest in held[i]]
     legend = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
     legend.append(("at a stop in colour", [rest for rest in shown if rest.at_stop]))

@@ -13,4 +13,4 @@ PICTURES = (
 
 
 class PlotError(RobotDynError):
-    """A run without anything to draw, or a figure that cannot be written."""
+    """A run without data to draw, or a figure that cannot be written."""

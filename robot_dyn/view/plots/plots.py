@@ -49,7 +49,7 @@ def plot(
     The figure of a batch shows fans of quantiles, outcomes, and a histogram and a scatter of one number per run;
     parts that do not apply are omitted.
 
-    The overview of up to 8 joints is not higher than A4 at any width. Text is 7 to 9 pt high.
+    The overview of up to 8 joints fits the height of A4 at any width. Text is 7 to 9 pt high.
 
     Args:
         run: A run with m samples of n joints, or rollouts.
@@ -62,16 +62,15 @@ def plot(
         theme: "light" or "dark", for screens.
         style: "paper" has thin lines, no title, and colours and dashes that differ in greyscale.
         width_mm: Width, in [mm], from 80 to 1000.
-        x: For rollouts, the column of their table on the x axis of a scatter; by default the first parameter that was
-            swept.
-        y: For rollouts, the column shown by a histogram and a scatter, for example "largest u elbow_joint"; by default
-            the tracking error.
+        x: For rollouts, the column of their table on the x axis of the scatter; by default the first varied parameter.
+        y: For rollouts, the column shown by histogram and scatter, for example "largest u elbow_joint"; by default the
+            tracking error.
 
     Raises:
         QueryError: If a part, a joint, a style or a theme is unknown, or the limits or the width are invalid.
-        PlotError: If the run has no samples, too many joints, or lacks what a requested part shows.
+        PlotError: If the run has no samples or too many joints, or lacks the data of a requested part.
     """
-    instance("run", run, TrajectoryData | RolloutsData, "give the trajectory of rd.simulate, or rollouts")
+    instance("run", run, TrajectoryData | RolloutsData, "give a trajectory of rd.simulate, or rollouts")
     of_batch = isinstance(run, RolloutsData)
     parts = [*names, *_names("only", only, "parts")]
     known = BATCH_PLOTS if of_batch else PLOTS
@@ -88,9 +87,9 @@ def plot(
             raise QueryError("limits= applies to a single run: plot(runs[0], limits=…)")
         return _of_batch(BatchView(run, _columns(run, shown), x, y, width), parts, look)
     if x is not None or y is not None:
-        raise QueryError("x and y name columns of rollouts, but this is a single run; leave them out")
+        raise QueryError("x and y are columns of rollouts, but this is a single run; omit them")
     if not len(run.t):
-        raise PlotError("the run has no samples, so there is nothing to draw; simulate again")
+        raise PlotError("nothing to draw: the run has no samples; simulate again")
     view = _view(run, shown, limits, width)
     with np.errstate(all="ignore"):  # the last samples of a run that diverged may overflow
         panels = [panel for name in parts or ("overview",) for panel in PLOTS[name](view)]
@@ -116,7 +115,7 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
 
 
 def _names(option: str, value: Any, kind: str) -> tuple[str, ...]:
-    """Return the names given as one name or several."""
+    """Return names as a tuple, from one name or several."""
     if isinstance(value, str):
         return (value,)
     if (names := () if value is None else several(value)) is None:

@@ -1,6 +1,6 @@
-"""The layout of a figure: panels of cells one under the other, by Matplotlib's constrained layout.
+"""The layout of a figure: panels of cells from top to bottom, by Matplotlib's constrained layout.
 
-Text keeps its size at any width. Rows become lower, down to a least height, where the figure would be higher than A4.
+Text has the same size at any width. If the figure would exceed A4, rows are made lower, down to a minimum height.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ if TYPE_CHECKING:
 
 WIDTH_MM, LEAST_MM, MOST_MM = 180.0, 80.0, 1000.0
 A4_MM, MM = 297.0, 1 / 25.4
-_HEADING, _BESIDE = 10.0, 14.0  # [mm]: about what a heading and a legend take, and what the y axis of a cell takes
-_LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, next to the text of a legend
-_RIGHT = 1.5  # [mm], free at the right for half of the last number of an x axis
-_MIN_ROW = 20.0  # [mm], with its title and its numbers
-_MAX_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary
+_HEADING, _BESIDE = 10.0, 14.0  # [mm]: approximate height of a heading with a legend, and width of the y axis of a cell
+_LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm] per pt: width of a letter, height of a line, width of a legend handle
+_RIGHT = 1.5  # [mm], margin at the right for half of the last tick label
+_MIN_ROW = 20.0  # [mm], with title and tick labels
+_MAX_REMARKS = 5  # characters of remarks above the panels, per mm of the width; the summary has all remarks
 
 
 @final
 @dataclass(frozen=True)
 class Panel:
-    """Rows of cells under a heading, and below them one legend of the curves that cells share.
+    """Rows of cells under a heading, and below them one legend of the shared curves.
 
     Attributes:
-        heading: Contents of the cells.
-        rows: Cells from the left to the right.
-        height: About how high a row is, with title and numbers, in [mm]; less where the page is full.
-        every: Number of rows that share the numbers and the name of x, below the last of them.
+        heading: Heading.
+        rows: Cells from left to right.
+        height: Approximate height of a row with title and tick labels, in [mm]; less if the page is full.
+        every: Number of rows that share one x axis, below the last of them.
     """
 
     heading: str
@@ -63,7 +63,7 @@ def draw(
 
     told = "\n".join(remarks)
     if len(told) > _MAX_REMARKS * width:
-        told = f"{told[: int(_MAX_REMARKS * width)].rpartition(' ')[0]} … the summary has all remarks"
+        told = f"{told[: int(_MAX_REMARKS * width)].rpartition(' ')[0]} … see the summary for all remarks"
     lines = sum(1 + _LETTER * style.text * len(line) // width for line in f"{opening}\n{told}".split("\n"))
     above = lines * _LINE * style.text if style.titled else 0.0
     heights = [panel.tall(panel.height) for panel in panels]
@@ -81,7 +81,7 @@ def draw(
 
 
 def headed(figure: FigureBase, text: str, colour: str, **font: Any) -> None:
-    """Write a text above the contents of a figure, in as many lines as its width requires."""
+    """Write a text above the contents of a figure, wrapped to its width."""
     if text:
         placed = {"x": 0.01, "ha": "left", "wrap": True}
         figure.suptitle(drawable(text), **placed, color=colour, parse_math=False, **font)
@@ -101,7 +101,7 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
             cell.fill(axes, style, diverged)
             has_x = (k + 1) % panel.every == 0
             axes.tick_params(labelbottom=has_x, length=2, pad=2)
-            side = "center" if cell.x == TIME else "left"  # at the right stands the factor of the numbers
+            side = "center" if cell.x == TIME else "left"  # the common factor of the tick labels is at the right
             axes.set_xlabel(drawable(cell.x) if has_x else "", labelpad=1, loc=side, fontsize=style.small, **style.ink)
             axes.set_ylabel(drawable(cell.y), fontsize=style.small, **style.ink)
             title = drawable(_title(cell, letters))
@@ -119,7 +119,7 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
 
 
 def _title(cell: Axes, letters: int) -> str:
-    """Return the title of a cell and its note, in lines of at most `letters` letters; long names break after "_"."""
+    """Return the title of a cell and its note, wrapped to `letters` characters; long names break after "_"."""
     parts = [text for text in (shortened(cell.title, 2 * letters), cell.note) if text]
     in_one = ", ".join(parts)
     return (
@@ -130,7 +130,7 @@ def _title(cell: Axes, letters: int) -> str:
 
 
 def _legend(where: Any, entries: dict[str, Any], style: Style, width: float, **placed: Any) -> None:
-    """Add a legend to axes or to a part of a figure, in as many columns as its width takes."""
+    """Add a legend to axes or to a part of a figure, in as many columns as fit."""
     wide = (_LETTER * max(map(len, entries)) + _HANDLE) * style.small
     legend = where.legend(
         entries.values(), entries.keys(), ncols=min(max(1, int(width / wide)), len(entries)), frameon=False,

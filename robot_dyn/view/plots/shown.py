@@ -1,4 +1,4 @@
-"""The Matplotlib figure that `plot` returns: a notebook shows it once, and it can be saved."""
+"""The Matplotlib figure that `plot` returns: notebooks show it once, and `save` writes it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from robot_dyn.foundations.errors import shorten
 from robot_dyn.foundations.validate import number
 from robot_dyn.view.plots.pictures import PICTURES, PlotError
 
-_MIN_DPI = 10.0  # below this, letters have no size in pixels
+_MIN_DPI = 10.0  # below this, letters are smaller than a pixel
 
 
 class Figure(MatplotlibFigure):
-    """A Matplotlib figure outside pyplot: a notebook shows it only where it is returned, with or without a backend."""
+    """A Matplotlib figure outside pyplot: a notebook shows it as the value of a cell, with or without a backend."""
 
     def save(self, path: str | Path, *, dpi: float = 200) -> Path:
         """Save the figure in the format of the suffix of `path`, completely or not at all; return the path.
@@ -38,7 +38,7 @@ class Figure(MatplotlibFigure):
             self.savefig(picture, format=path.suffix[1:].lower(), dpi=dpi)
         except (ValueError, MemoryError, RuntimeError, OverflowError, TypeError) as error:  # Matplotlib, by dpi
             raise PlotError(
-                f"{path}: cannot be drawn at {dpi:g} dpi ({shorten(error)}); show less, or use dpi=150"
+                f"{path}: cannot be drawn at {dpi:g} dpi ({shorten(error)}); draw fewer parts, or use dpi=150"
             ) from None
         return files.save(path, lambda stream: stream.write(picture.getvalue()), PlotError)
 

@@ -1,6 +1,6 @@
-"""The page at given times, as pictures of an installed browser without a window, driven by Playwright over pipes.
+"""Pictures of a page at given times by an installed browser without a window, driven by Playwright over pipes.
 
-The browser has no network and listens on no port; it ends with the program, even one that is killed.
+The browser has no network and listens on no port; it ends with the program, even if that is killed.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from robot_dyn.foundations.errors import VideoError, shorten
 from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import file_path
 
-_PATIENCE_MS = 120_000.0  # for an answer; a machine with a slow disk takes tens of seconds to start a browser
+_PATIENCE_MS = 120_000.0  # timeout; starting a browser from a slow disk takes tens of seconds
 _NAMES = (
     "google-chrome", "google-chrome-stable", "chromium", "chromium-browser", "chrome", "microsoft-edge",
     "microsoft-edge-stable",
 )  # fmt: skip
 _PROGRAMS = ("/Applications/Chromium.app/Contents/MacOS/Chromium",)  # browsers without a channel, on macOS
 _CHANNELS = ("chrome", "msedge")  # browsers that are not on the path
-# WebGL by the processor, so that pictures do not depend on a graphics card; no network.
+# WebGL on the CPU, so that pictures do not depend on a graphics card; no network.
 _FLAGS = [
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--host-resolver-rules=MAP * ~NOTFOUND",
     "--disable-quic", "--font-render-hinting=none",
@@ -86,13 +86,13 @@ def frames(
                 yield page.screenshot()
     except api.Error as error:
         first, said = str(error).splitlines()[0].partition(": ")[2], re.findall(r"\[err\] (.*)", str(error))
-        told = f"it said: {shorten(said[-1])}" if said else "it must be of 2023 or later"
+        told = f"its last message: {shorten(said[-1])}" if said else "it must be from 2023 or later"
         raise VideoError(f"{program or 'the browser'}: {shorten(first)}; {told}") from None
 
 
 @contextmanager
 def _driver(api: Any, folder: str) -> Iterator[Any]:
-    """Start and end Playwright, with a folder for its temporary files: it leaves those of a launch that failed."""
+    """Start and end Playwright, with a folder for its temporary files, which remain after a failed launch."""
     names = ("TMPDIR", "TEMP", "TMP")
     before = {name: os.environ.get(name) for name in names}
     driver = api.sync_playwright()
@@ -122,7 +122,6 @@ def _launched(chromium: Any, program: Path | None, folder: str, error: type[Exce
             if "not found" not in str(cause):
                 raise
     raise VideoError(
-        "a video is drawn by Chrome, Chromium or Edge, and none is installed: install one, such as by apt-get install"
-        " chromium or brew install --cask google-chrome; if it has another name, give its path by save_video(…,"
-        " browser=…)"
+        "a video needs Chrome, Chromium or Edge, but none was found; install one, for example by apt-get install"
+        " chromium or brew install --cask google-chrome, or give its path by save_video(…, browser=…)"
     )

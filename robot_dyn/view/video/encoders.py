@@ -1,6 +1,6 @@
 """Videos by the ffmpeg of imageio-ffmpeg: MP4 (H.264) and GIF.
 
-A GIF has times in steps of 1/100 s: frame k begins at round(100 k / fps), so that no error adds up.
+Times of a GIF are multiples of 1/100 s: frame k begins at round(100 k / fps), so that errors do not accumulate.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robot_dyn.foundations.errors import VideoError
 from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import why
 
-_CRF = 18  # constant rate factor of x264: differences are hardly seen
+_CRF = 18  # constant rate factor of x264: nearly lossless to the eye
 _PALETTE = "split[a][b];[a]palettegen[c];[b][c]paletteuse=dither=none"  # one for all frames
 
 
@@ -30,7 +30,7 @@ def ffmpeg() -> Any:
     try:
         module.get_ffmpeg_exe()
     except RuntimeError:
-        raise VideoError("imageio-ffmpeg has no ffmpeg for this system: install ffmpeg") from None
+        raise VideoError("imageio-ffmpeg has no ffmpeg for this system; install ffmpeg") from None
     return module
 
 

@@ -1,4 +1,4 @@
-"""A video of a page: checks, then the browser, the frames and the encoder; the file is written when all is done."""
+"""A video of a page: checks, then the browser, the frames and the encoder; the file is written at the end."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from robot_dyn.view.video import encoders
 from robot_dyn.view.video.browser import frames, installed, playwright
 
 KINDS = FileKind("an MP4 video", ".mp4", b"\0\0\0"), FileKind("a GIF", ".gif", b"GIF8")
-_FPS, _MAX_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
+_FPS, _MAX_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down faster GIFs
 _MAX_FRAMES = 20_000
-_ROUNDING = 1e-9  # fraction of a frame: T fps is a whole number up to this
-_MAX_PIXELS = 5 * 10**8  # pixels of a GIF; its frames take 4.5 bytes a pixel in memory
+_ROUNDING = 1e-9  # fraction of a frame by which T · fps may differ from a whole number
+_MAX_PIXELS = 5 * 10**8  # pixels of a GIF; its frames take 4.5 bytes per pixel in memory
 _MIN_SIZE, _MAX_SIZE = 160, 3840
 
 
@@ -86,11 +86,11 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 def _checked_times(duration_s: float, fps: int, kind: str, size: tuple[int, int]) -> np.ndarray:
     """Return the times of the frames; raise a VideoError if their number or size is not allowed."""
     if not duration_s > 0:
-        raise VideoError("no run on the page has a duration, so nothing moves; save the page with .save(path)")
+        raise VideoError("the page has no run with a duration, so there is no video; save the page by .save(path)")
     count = duration_s * fps
     if count > _MAX_FRAMES:
         raise VideoError(
-            f"{duration_s:g} s at {fps} frames a second are {count:.0f} frames, more than {_MAX_FRAMES}; use a lower"
+            f"{duration_s:g} s at {fps} frames per second are {count:.0f} frames, more than {_MAX_FRAMES}; use a lower"
             " frame rate"
         )
     if kind == ".gif" and count * size[0] * size[1] > _MAX_PIXELS:

@@ -1,1 +1,1 @@
-"""The HTML of a page: replay.html, replay.css and the scripts, which text.py puts together."""
+"""The HTML of a page: replay.html, replay.css and the scripts, which text.py combines."""

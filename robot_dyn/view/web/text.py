@@ -1,8 +1,8 @@
 """The HTML text of a page: one file that contains the viewer, the plots, the slider and all data.
 
-The viewer's script, most of the text, stands in it compressed; the page inflates it, and the browser runs it only if
-the content policy has the digest of what came out. Pages of one folder may share it: then it stands, compressed, in a
-file beside them that puts it into the page, and the digest is asked for all the same.
+The viewer's script, most of the text, is compressed. The page decompresses it, and the browser runs it only if its
+digest is in the content policy. Pages of one folder may share it: a compressed file next to them inserts it into the
+page, and the digest is checked, too.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from robot_dyn.view.commands import as_text, packed
 
 # Nothing is loaded, and only the scripts in the page run; pictures are data.
 _POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; script-src {}; style-src {}; img-src data: blob:"
-# One concept a file; they share their names.
+# One concept per file; all share one namespace.
 _SCRIPTS = (
     "keys.js", "clock.js", "sliders.js", "camera.js", "layers.js", "plots.js", "panels.js", "why.js", "film.js",
     "replay.js",
 )  # fmt: skip
-_PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, gives itself
+_PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, adds
 
 
 def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
@@ -35,7 +35,7 @@ def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
 
     Args:
         document: Result of `document` or `still`.
-        viewer: Name of a file with the text of `shared_viewer`, next to the page; if empty, the viewer is in the page.
+        viewer: Name of a file next to the page with the text of `shared_viewer`; if empty, the page contains it.
     """
     web = Path(__file__).parent
     meshcat = _viewer()
@@ -58,18 +58,18 @@ def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
 
 
 def shared_viewer() -> str:
-    """Return the text of the script that several pages share: it puts the viewer, compressed, into the page."""
+    """Return the script that several pages share; it inserts the compressed viewer into the page."""
     return f'document.getElementById("meshcat").textContent = "{packed(_viewer().encode())}";\n'
 
 
 def _hashes(texts: Iterable[str]) -> str:
-    """Return the sources of a content policy that allow these texts only [CSP 3, §2.3.1]."""
+    """Return the sources of a content policy that allow only these texts [CSP 3, §2.3.1]."""
     digests = (sha256(text.encode()).digest() for text in texts)
     return " ".join(f"'sha256-{b64encode(digest).decode()}'" for digest in digests)
 
 
 def _own_styles(meshcat: str) -> Iterator[str]:
-    """Return the styles that meshcat puts into its page: an empty one, filled later, and that of its panel."""
+    """Yield the styles that meshcat adds to its page: an empty one, filled later, and that of its panel."""
     yield ""
     for text in _PANEL.findall(meshcat):
         yield json.loads(f'"{text}"')
