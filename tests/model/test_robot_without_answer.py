@@ -131,7 +131,7 @@ def test_overflow_is_seen_where_position_and_velocity_are_orthogonal():
     robot = rd.load("skew_tree")
     with pytest.raises(OverflowedError, match="result overflows: q, v are too large"):
         robot.C(np.array([0, 0, 1e200, 0, 0]), np.array([1e200, 0, 0, 0, 0]))
-    with pytest.raises(OverflowedError, match=r"q (is|are) so large"):
+    with pytest.raises(OverflowedError, match="result overflows: q is too large"):
         robot.M(np.array([0, 0, 1e200, 0, 0]))
 
 
