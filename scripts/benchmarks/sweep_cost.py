@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -187,8 +188,7 @@ def cluster(given: argparse.Namespace) -> None:
     once, the setup and its kernels, is told apart.
     """
     many = panda if given.arm == "panda" else planar
-    import distributed
-
+    distributed: Any = import_module("distributed")
     with (
         tempfile.TemporaryDirectory() as folder,
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local,
