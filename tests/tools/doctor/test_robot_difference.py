@@ -241,7 +241,9 @@ def test_values_are_compared_of_mapped_joints_only_and_the_others_are_named() ->
     mapped = tuple(x.a for x in difference.joints)
     assert mapped == ("shoulder_pan_joint", "shoulder_lift_joint")
     assert difference.not_compared == (a.joint_names[2:], ("knee", *a.joint_names[3:]))
-    assert [(x.joint, x.quantity, x.b) for x in difference.differences] == [("shoulder_pan_joint", "effort limit", (7,))]
+    assert [(x.joint, x.quantity, x.b) for x in difference.differences] == [
+        ("shoulder_pan_joint", "effort limit", (7,))
+    ]
     assert diff(a, a).not_compared == ((), ())
 
 
