@@ -46,6 +46,9 @@ class Server:
         self._thread = Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
 
+    def __repr__(self) -> str:
+        return f"<Server: {self.url}>"
+
     def close(self) -> None:
         """End the server."""
         if self._thread.is_alive():
