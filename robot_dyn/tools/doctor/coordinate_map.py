@@ -3,14 +3,14 @@
 From the base outwards, each body of b is laid on its counterpart in a: its joint axis on that of a, which gives the
 sign s; then turned about it until the axes of the joints that it carries coincide, which gives the offset o. An axis is
 a line, so some angles are ambiguous by π: the best of up to 64 combinations is kept, measured by the misfit of the
-axes, then of the centres of mass and of links of one name, then by the number of joints without q_b = q_a. Values that
-are given replace the proposal of their joint alone.
+axes, then of the centres of mass and of links of one name, then by the number of joints without q_b = q_a. Whole turns,
+which no axis shows, are chosen by the position limits. Values that are given replace the proposal of their joint alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import takewhile
 from math import atan2, pi
@@ -151,7 +151,10 @@ def laid_bodies(
                 raise QueryError(f"signs[{name!r}] must be 1 or -1, got {shown(value)}")
     of_a, of_b = Lagrangian(a).linkage, Lagrangian(b).linkage
     pairs, obstacles = _pairs(of_a, of_b, names)
-    laid = _best(of_a, of_b, pairs, {})
+    laid = tuple(
+        x._replace(map=_turned(x.map, a, b)) if of_a.bodies[x.i].revolute and x.map.a in a.joint_names else x
+        for x in _best(of_a, of_b, pairs, {})
+    )
     if signs or offsets:  # joints without given values keep their proposals
         maps = {
             x.a: x if x.a not in {**signs, **offsets} else JointMap(
@@ -166,6 +169,24 @@ def laid_bodies(
         if body.turn > _LARGEST_TURN and body.map.basis is not Basis.GIVEN
     ]
     return laid, tuple(obstacles)
+
+
+def position_limits(joint: JointMap, a: Robot, b: Robot) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the position limits of a joint in a, and those in b converted to the coordinate of a."""
+    j, k = a.joint_names.index(joint.a), b.joint_names.index(joint.b)
+    low, high = sorted(joint.sign * (float(end[k]) - joint.offset) for end in (b.lower, b.upper))
+    return (float(a.lower[j]), float(a.upper[j])), (low, high)
+
+
+def _turned(joint: JointMap, a: Robot, b: Robot) -> JointMap:
+    """Return the map with o + 2πk: the smallest |o| of those at which the position limits overlap most."""
+    overlaps = dict[JointMap, float]()
+    for k in range(-3, 4):
+        turned = replace(joint, offset=joint.offset + 2 * pi * k)
+        (low, high), (low_b, high_b) = position_limits(turned, a, b)
+        overlaps[turned] = min(high, high_b) - max(low, low_b)
+    largest = max(overlaps.values()) - _SNAP
+    return min((x for x in overlaps if overlaps[x] >= largest), key=lambda x: (round(abs(x.offset), 9), -x.offset))
 
 
 def _best(a: Linkage, b: Linkage, pairs: Mapping[int, int], maps: Mapping[str, JointMap]) -> tuple[Laid, ...]:
@@ -322,5 +343,4 @@ def _snapped(angle: float) -> float:
     """Return an angle in (−π, π], rounded to a multiple of π/4 if close to it."""
     angle = pi - (pi - angle) % (2 * pi)
     near = round(angle / (pi / 4)) * (pi / 4)
-    near = pi if near <= -pi else near
-    return near if abs(angle - near) < _SNAP else angle
+    return angle if abs(angle - near) >= _SNAP else near if near > -pi else pi

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import degrees, pi
 from pathlib import Path
@@ -28,8 +28,17 @@ from robot_dyn.foundations import (
     truth,
 )
 from robot_dyn.queries import of_joint, unit
-from robot_dyn.tools.doctor.coordinate_map import Basis, JointMap, Laid, Obstacle, Unmapped, laid_bodies, matched_names
-from robot_dyn.tools.doctor.largest_difference import LargestDifference, MappedPair, largest_differences, mapped_pair
+from robot_dyn.tools.doctor.coordinate_map import (
+    Basis,
+    JointMap,
+    Laid,
+    Obstacle,
+    Unmapped,
+    laid_bodies,
+    matched_names,
+    position_limits,
+)
+from robot_dyn.tools.doctor.largest_difference import LargestDifference, largest_differences, mapped_pair
 
 _DIFFERENT = 1e-5  # of the size of a value: rounded angles such as 1.5708 cause smaller differences
 _LISTED = 4  # bodies, and joints without counterpart, that are printed
@@ -52,7 +61,8 @@ class Difference:
     Attributes:
         joint: Joint of a whose axis, limits or body differ; empty for the whole robot.
         quantity: Name of the value. Mass, centre and moments are those of the joint's body: all links without relative
-            motion. Centre and moments are in the joint's frame of a, moments about the centre of mass.
+            motion. Centre and moments are in the joint's frame of a, moments about the centre of mass. Links fixed to
+            the base have no joint and are not compared.
         unit: Its unit.
         a, b: Components of the value; those of b are converted to the coordinates and axes of a. Empty if absent.
     """
@@ -74,7 +84,9 @@ class RobotDifference(Answer):
         sources: Their files.
         joints: The map q_b = s q_a + o, by joint.
         unmapped: Joints that prevent a comparison of torques; then `largest` is empty.
-        differences: Values that differ by more than 1e-5 of their size.
+        not_compared: Moving joints of a, and of b, whose values are not compared: they have no counterpart, or a joint
+            that carries them has none.
+        differences: Values of the other joints that differ by more than 1e-5 of their size.
         order: Joint names of q_a and of q_b, each in the names of a, if their order differs; otherwise empty.
         largest: Largest differences found of N and of M, by joint.
         tolerance: Largest accepted difference, in [N m] or [N]; entries of M are multiplied by 1 rad/s² or 1 m/s².
@@ -85,6 +97,7 @@ class RobotDifference(Answer):
     sources: tuple[str, str]
     joints: tuple[JointMap, ...]
     unmapped: tuple[Unmapped, ...]
+    not_compared: tuple[tuple[str, ...], tuple[str, ...]]
     differences: tuple[Difference, ...]
     order: tuple[tuple[str, ...], ...]
     largest: tuple[LargestDifference, ...]
@@ -129,8 +142,9 @@ class RobotDifference(Answer):
         yield self.sentence
         yield ""
         yield from (f"{name}: {source}" for name, source in zip(self.names, self.sources, strict=True))
-        yield ""
-        yield from self._map()
+        if self.joints:
+            yield ""
+            yield from self._map()
         if self.order:
             yield ""
             yield f"the order of q differs: {', '.join(self.order[0])} in {a}; {', '.join(self.order[1])} in {b}"
@@ -145,11 +159,22 @@ class RobotDifference(Answer):
                 for x in self.differences
             )
             yield Table(("joint", "value", a, b), rows, right=(a, b))
-        else:
-            yield f"no masses, centres, moments, axes or limits differ in the coordinates of {a}"
+        elif self.joints:
+            of = "" if self._compares_all else f" of {_joined(x.a for x in self.joints)}"
+            yield (
+                f"no values{of} differ in the coordinates of {a}: masses, centres and moments of moving links, axes and"
+                " limits; links fixed to the base are not compared"
+            )
+        if not self._compares_all:
+            pairs = zip(self.not_compared, self.names, strict=True)
+            yield f"not compared: {'; '.join(f'{_joined(joints)} of {name}' for joints, name in pairs if joints)}"
         if self.largest:
             yield ""
             yield from self._cost()
+
+    @property
+    def _compares_all(self) -> bool:
+        return not any(self.not_compared)
 
     def _unmapped(self, file: str, obstacle: Obstacle) -> str:
         """Return the unmapped joints of a file with one obstacle, and the remedy."""
@@ -162,8 +187,13 @@ class RobotDifference(Answer):
     def _map(self) -> Iterator[Block]:
         a, b = self.names
         if all((x.a, x.sign, x.offset) == (x.b, 1, 0.0) for x in self.joints):
-            given = all(x.basis is Basis.GIVEN for x in self.joints)
-            yield f"equal coordinates: q of {b} = q of {a}, {'as given' if given else 'as names and joint axes show'}"
+            given = [x.a for x in self.joints if x.basis is Basis.GIVEN]
+            shown_by = "as names and joint axes show"
+            if given:
+                all_given = len(given) == len(self.joints)
+                shown_by = "as given" if all_given else f"as given at {_joined(given)}, otherwise {shown_by}"
+            of = "" if self._compares_all else f" at {_joined(x.a for x in self.joints)}"
+            yield f"equal coordinates{of}: q of {b} = q of {a}, {shown_by}"
             return
         yield f"map of coordinates: q of {b} = s · q of {a} + o"
         yield "correct a row by signs= or offsets= (--sign, --offset); compare at equal q by same_q=True (--same-q)"
@@ -255,9 +285,9 @@ def diff_robots(
     laid, unmapped = laid_bodies(a, b, names, signs, offsets)
     maps = tuple(body.map for body in laid)
     largest, order, differences = (), (), [*_of_robot(a, b), *_of_bodies(a, b, laid), *_of_followers(a, b, laid)]
+    differences += _of_coordinates(a, b, maps)
     if not unmapped:
         pair = mapped_pair(a, b, maps)
-        differences += _of_coordinates(pair)
         in_b = tuple(pair.bodies[name] for name in b.joint_names)
         order = () if in_b == a.joint_names else (a.joint_names, in_b)
         structure = structure_of(a.description, a.edits)
@@ -271,12 +301,17 @@ def diff_robots(
         sources=sources,
         joints=maps,
         unmapped=unmapped,
+        not_compared=(_others(a, {x.a for x in maps}), _others(b, {x.b for x in maps})),
         differences=tuple(differences),
         order=order,
         largest=largest,
         tolerance=tolerance,
         samples=samples,
     )
+
+
+def _others(robot: Robot, compared: set[str]) -> tuple[str, ...]:
+    return tuple(body.joint for body in Lagrangian(robot).linkage.bodies if body.joint not in compared)
 
 
 def _labels(a: Robot, b: Robot) -> tuple[str, str]:
@@ -343,13 +378,15 @@ def _body(inertia: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     return m, c, inertia[3:, 3:] + m * hat(c) @ hat(c)
 
 
-def _of_coordinates(pair: MappedPair) -> Iterator[Difference]:
+def _of_coordinates(a: Robot, b: Robot, maps: tuple[JointMap, ...]) -> Iterator[Difference]:
     """Yield the differences of limits, friction and armature."""
-    a, b, order = pair.a, pair.b, pair.order
-    low, high = pair.limits_of_b()
-    for j, (name, kind) in enumerate(zip(a.joint_names, a.joint_types, strict=True)):
-        limits = (a.lower[j], a.upper[j]), (low[j], high[j])
-        yield from _differing(name, "position limits", unit("q", kind), *limits, pi)
+    for joint in maps:
+        name = joint.a
+        if name not in a.joint_names:  # a follower
+            continue
+        j, k = a.joint_names.index(name), b.joint_names.index(joint.b)
+        kind = a.joint_types[j]
+        yield from _differing(name, "position limits", unit("q", kind), *position_limits(joint, a, b), pi)
         for quantity, symbol, x, y in (
             ("effort limit", "N m", a.effort_limit, b.effort_limit),
             ("velocity limit", "rad/s", a.velocity_limit, b.velocity_limit),
@@ -357,7 +394,7 @@ def _of_coordinates(pair: MappedPair) -> Iterator[Difference]:
             ("dry friction", "N m", a.friction, b.friction),
             ("armature", "kg m²", a.armature, b.armature),
         ):
-            yield from _differing(name, quantity, of_joint(symbol, kind), [x[j]], [y[order[j]]])
+            yield from _differing(name, quantity, of_joint(symbol, kind), [x[j]], [y[k]])
 
 
 def _differing(
@@ -374,6 +411,10 @@ def _differing(
         yield Difference(joint, quantity, unit, *rounded)
 
 
+def _joined(names: Iterable[str]) -> str:
+    return ", ".join(names)
+
+
 def _of_effort(row: LargestDifference) -> str:
     return f", {_percent(row.effort_fraction)} of its effort limit" if np.isfinite(row.effort_fraction) else ""
 
@@ -384,7 +425,7 @@ def _percent(fraction: float) -> str:
 
 def _offset(offset: float) -> str:
     turns = offset / (pi / 4)
-    exact = {-3: "−3π/4", -2: "−π/2", -1: "−π/4", 1: "π/4", 2: "π/2", 3: "3π/4", 4: "π"}
+    exact = {-4: "−π", -3: "−3π/4", -2: "−π/2", -1: "−π/4", 1: "π/4", 2: "π/2", 3: "3π/4", 4: "π"}
     return exact[round(turns)] if round(turns) in exact and abs(turns - round(turns)) < 1e-9 else f"{offset:.6g}"
 
 

@@ -230,6 +230,41 @@ def test_a_joint_without_counterpart_is_named_and_no_torque_is_compared() -> Non
     assert diff(a, b, joints={"elbow_joint": "knee"}).agrees
 
 
+def test_values_are_compared_of_mapped_joints_only_and_the_others_are_named() -> None:
+    """Beyond a joint without counterpart no value is compared; a changed limit before it is found."""
+    a, root = rd.load("ur5"), tree("ur5")
+    joint(root, "elbow_joint").set("name", "knee")
+    joint(root, "shoulder_pan_joint").find("limit").set("effort", "7")
+    for element in root.xpath("transmission"):
+        root.remove(element)
+    difference = diff(a, robot(root))
+    mapped = tuple(x.a for x in difference.joints)
+    assert mapped == ("shoulder_pan_joint", "shoulder_lift_joint")
+    assert difference.not_compared == (a.joint_names[2:], ("knee", *a.joint_names[3:]))
+    assert [(x.joint, x.quantity, x.b) for x in difference.differences] == [
+        ("shoulder_pan_joint", "effort limit", (7,))
+    ]
+    assert diff(a, a).not_compared == ((), ())
+
+
+@pytest.mark.parametrize("c", [4.0, -4.0, pi, -pi, 3.1415927])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_whole_turns_of_an_offset_are_chosen_by_the_limits(c: float, sign: int) -> None:
+    """Axes show o modulo 2π; only at o = −s c do the shifted limits of b agree with those of a."""
+    a, root = rd.load("ur5"), tree("ur5")
+    rezeroed(root, "shoulder_lift_joint", sign, c)
+    difference = diff(a, robot(root), tolerance=1e-4)
+    assert difference.joints[1].offset == pytest.approx(-sign * c, abs=1e-6) and difference.agrees
+    assert not [x for x in difference.differences if x.quantity == "position limits"]
+
+
+def test_the_offset_of_a_joint_without_limits_is_the_smallest() -> None:
+    a, root = rd.load("ur5"), tree("ur5")
+    rezeroed(root, "shoulder_lift_joint", 1, 4.0)
+    joint(root, "shoulder_lift_joint").set("type", "continuous")
+    assert diff(a, robot(root)).joints[1].offset == pytest.approx(2 * pi - 4.0, abs=1e-9)
+
+
 def test_another_ratio_of_a_follower_is_reported() -> None:
     root = tree("mimic_chain")
     mimic = next(root.iter("mimic"))
