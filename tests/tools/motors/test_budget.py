@@ -15,7 +15,7 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.effects.torque_speed import TorqueSpeed
+from robot_dyn.effects import TorqueSpeed
 from robot_dyn.foundations import EditError, EffectError, PlanError, QueryError
 from robot_dyn.tools.motors import budget, fastest, max_payload
 from robot_dyn.tools.motors.limits import Limits

@@ -190,7 +190,7 @@ def _worst_load(demand: Demand, plant: Plant, limits: Limits) -> _Bound:
 
 
 def _interval(share: Callable[[float], float], least: float, most: float) -> tuple[float, float, float]:
-    """Return the masses at which a convex share is at most 1: both ends and a mass between, the best one if none is."""
+    """Return the masses at which a convex share is at most 1: both ends and a mass between."""
     optimize: Any = import_module("scipy.optimize")
     inside = min((least, most), key=share)
     if share(inside) > 1:
