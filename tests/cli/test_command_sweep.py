@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps import run_sweep
 from tests import command
 from tests.promised import check_document
 from tests.tools.sweeps.swept import SCENE, scene
@@ -42,3 +44,18 @@ def test_a_sweep_that_is_not_complete_says_what_is_left(tmp_path: Path) -> None:
     said = command.run("sweep", str(path), "-o", str(out), *options)
     assert said.returncode == 0 and "5 of 10 chunks are missing" in said.stdout
     assert "5 of 10 chunks" in command.run("sweep", "status", str(out)).stdout
+
+
+def test_ctrl_c_summarises_the_chunks_that_are_kept_and_ends_with_130(tmp_path: Path, monkeypatch) -> None:
+    """Also the one job of an array."""
+
+    def interrupted(make: Callable[..., object], *_: object) -> None:
+        make(0, lambda _: None)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_sweep, "fill_by_threads", interrupted)
+    path, out = scene(tmp_path), tmp_path / "out"
+    options = "--runs", "40", "--vary", "kp=uniform(low=10, high=20)", "--chunk", "10", "--job", "1/2"
+    ended = command.run("sweep", str(path), "-o", str(out), *options)
+    assert ended.returncode == 130 and "interrupted" in ended.stderr
+    assert "3 of 4 chunks are missing" in ended.stdout

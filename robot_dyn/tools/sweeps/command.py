@@ -63,7 +63,7 @@ def sweep(
     """
     from robot_dyn.tools import sweeps as sw
 
-    verified: list[str] = []
+    verified, interrupted = list[str](), False
     figures = arguments.pairs("--figure", figure)
     options: dict[str, Any] = {"threads": threads, "job": job}
     if scene_or_action.lower().endswith(".toml"):
@@ -73,7 +73,7 @@ def sweep(
         changes: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
         changes |= {"uncut": True} if uncut else {}
         stated = sw.from_scene(scene_or_action, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
-        result = _run(stated, output, options | {"chunk": chunk})
+        result, interrupted = _run(stated, output, options | {"chunk": chunk})
     else:
         if scene_or_action not in ACTIONS:
             raise SweepError(
@@ -93,7 +93,7 @@ def sweep(
             )
         result = sw.read_sweep(folder, scene, figures)
         if scene_or_action == "run":
-            result = _run(result.sweep, folder, options)
+            result, interrupted = _run(result.sweep, folder, options)
         elif scene_or_action == "verify":
             verified = [f"all rows: SHA-256 {result.verify()}"]
             verified += [f"{count} chunks by {name}" for name, count in result.processors.items()]
@@ -105,13 +105,21 @@ def sweep(
         say_json(result, probabilities=dict(zip(probability or (), answers, strict=False)))
     else:
         say(result, *verified, *answers)
-    if result.status["missing"] and scene_or_action != "status" and job is None:
+    if interrupted:
         raise typer.Exit(130)
 
 
-def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
-    """Fill the folder."""
+def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> tuple[SweepResult, bool]:
+    """Fill the folder; return its result, and True if Ctrl-C ended the work."""
     from robot_dyn.tools import sweeps as sw
+    from robot_dyn.tools.sweeps.folder import folder_of
+    from robot_dyn.tools.sweeps.specification import FILE, stated_in
 
     to_stderr(f"{stated.runs} runs, {stated.bytes_expected / 2**20:.3g} MiB on disk")
-    return sw.run(stated, folder, **options)
+    path = Path(folder)
+    try:
+        return sw.run(stated, path, **options), False
+    except KeyboardInterrupt:
+        if not (path / FILE).is_file():  # in the pilot: there is nothing to summarise
+            raise
+        return sw.SweepResult(stated, folder_of(path, stated, stated_in(path))), True

@@ -37,7 +37,7 @@ OLD_S = 86_400.0  # age in [s] after which an unfinished file is removed
 UNCUT = "uncut.json"
 _MOST_TABLE, _MOST_COMPARISON = 2**34, 2**20
 _FOOTER, _UNFINISHED = b"footer", ".unfinished"
-_REMEDY = "run the sweep again, after removing this file"
+_REMEDY = "remove this file, then run the sweep again"
 _AGAIN = "run the sweep into this folder again, which writes the file"
 
 

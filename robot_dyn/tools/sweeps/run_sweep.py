@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import disk_usage
 from time import perf_counter, process_time
@@ -52,8 +52,8 @@ def run(
 ) -> SweepResult:
     """Make the missing runs of a sweep in a folder, and return the result.
 
-    Several processes, on this machine or others, may fill one folder. Rows have the same bits in all cases. Ctrl-C ends
-    the work and drops unfinished chunks.
+    Several processes, on this machine or others, may fill one folder. Rows have the same bits in all cases. Ctrl-C drops
+    unfinished chunks and raises KeyboardInterrupt; the folder keeps finished ones.
 
     Args:
         sweep: The sweep.
@@ -67,6 +67,7 @@ def run(
 
     Raises:
         SweepError: If an argument is invalid, the folder contains another sweep, or a file cannot be written.
+        KeyboardInterrupt: If Ctrl-C ends the work; call again to resume.
     """
     if on_progress is None:
         with _bar(sweep) as advance:
@@ -102,16 +103,15 @@ def run(
         if not store.file(number).exists():  # another driver was first
             store.write(number, *work.run_rows(*store.run_range(number), look))
 
-    with suppress(KeyboardInterrupt):
-        if cluster is None:
-            fill_by_threads(make, missing, count, report_progress)
-        else:
-            from robot_dyn.tools.sweeps.cluster import fill_by_cluster
+    if cluster is None:
+        fill_by_threads(make, missing, count, report_progress)
+    else:
+        from robot_dyn.tools.sweeps.cluster import fill_by_cluster
 
-            fill_by_cluster(cluster, store, names_of(sweep), missing, report_progress)
-        if sweep.uncut and not len(store.missing()) and not (path / UNCUT).exists():
-            with suppress(Stopped):
-                store.write_comparison(work.compared())
+        fill_by_cluster(cluster, store, names_of(sweep), missing, report_progress)
+    if sweep.uncut and not len(store.missing()) and not (path / UNCUT).exists():
+        with _interruptible():
+            store.write_comparison(work.compared())
     last = -_SCAN_S
     report_progress()
     return SweepResult(sweep, store)
@@ -197,8 +197,15 @@ def pilot(sweep: Sweep, chunk: int | None = None) -> int:
         SweepError: If no run finishes and some runs or their figures raise; with the first reason.
         KeyboardInterrupt: If Ctrl-C stops a run.
     """
-    try:
+    with _interruptible():
         return _pilot(Work(sweep), sweep, chunk)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Raise KeyboardInterrupt if Ctrl-C stopped the runs of a block."""
+    try:
+        yield
     except Stopped:
         raise KeyboardInterrupt from None
 

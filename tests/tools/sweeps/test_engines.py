@@ -159,7 +159,7 @@ def test_shares_that_cannot_be_are_refused(tmp_path: Path, given: Any) -> None:
 # --- threads
 
 
-def test_ctrl_c_drops_the_chunks_under_way_and_keeps_the_rest(tmp_path: Path) -> None:
+def test_ctrl_c_drops_the_chunks_under_way_keeps_the_rest_and_is_raised(tmp_path: Path) -> None:
     sweep, calls = swept(tmp_path, 600), []
 
     def interrupted(done: int, runs: int) -> None:
@@ -167,7 +167,9 @@ def test_ctrl_c_drops_the_chunks_under_way_and_keeps_the_rest(tmp_path: Path) ->
         if len(calls) == 1:
             raise KeyboardInterrupt
 
-    done = sw.run(sweep, tmp_path / "out", chunk=5, threads=2, on_progress=interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sw.run(sweep, tmp_path / "out", chunk=5, threads=2, on_progress=interrupted)
+    done = sw.read_sweep(tmp_path / "out")
     assert 0 < len(done.missing) <= 120 and f"{len(done.missing)} of 120 chunks are missing" in repr(done)
     assert not list((tmp_path / "out" / "rows").glob(".*"))
     again = sw.run(sweep, tmp_path / "out")
