@@ -52,8 +52,8 @@ def run(
 ) -> SweepResult:
     """Make the missing runs of a sweep in a folder, and return the result.
 
-    Several processes, on this machine or others, may fill one folder. Rows have the same bits in all cases. Ctrl-C drops
-    unfinished chunks and raises KeyboardInterrupt; the folder keeps finished ones.
+    Several processes, on this machine or others, may fill one folder. Rows have the same bits in all cases. Ctrl-C
+    drops unfinished chunks and raises KeyboardInterrupt; the folder keeps finished ones.
 
     Args:
         sweep: The sweep.
