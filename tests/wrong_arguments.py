@@ -245,6 +245,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(robot.random_configuration, rng=np.random.default_rng(0)),
         call(robot.joint_wrenches, q=q, v=v, a=u, external={"pole": np.ones(6)}, frame="pole", at="pole"),
         call(robot.attach, gripper=rd.load("planar_2r"), frame="pole", prefix="g_", xyz=(0, 0.1, 0), rpy=(0.3, 0, 0)),
+        call(rd.load("panda").with_soft_limits),
         call(robot.with_, gravity=(1.0, 0.0, -9.0), lock={"hinge": 0.1}, payload=rd.Payload("pole", 1.0),
             armature=0.1, mass_scale=1.1),
         call(several.outcome, run=1),

@@ -232,7 +232,7 @@ def test_the_estimate_is_no_less_than_the_error() -> None:
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda robot, q: rd.accuracy.digits(robot, "M", q, q), "digits of M need the arguments q; got 2 arguments"),
+        (lambda robot, q: rd.accuracy.digits(robot, "M", q, q), "digits of M need the arguments q, got 2 arguments"),
         (
             lambda robot, q: rd.accuracy.digits(robot, "N", [q, q]),
             r"digits are counted at one state: q must have .* got \(2, 2\)",

@@ -102,7 +102,7 @@ def test_it_runs_in_balls_that_hold_the_float_value() -> None:
 def test_where_the_points_meet_there_is_no_direction() -> None:
     """An error that says so; a run that comes there in either engine ends, with the same words."""
     plant = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=3.0, damping=1.0, length=0.1)])
-    with pytest.raises(EffectError, match="line_spring_damper: the points of 'a' and 'b' coincide"):
+    with pytest.raises(EffectError, match="line_spring_damper: the points on 'a' and 'b' coincide"):
         plant.torque(np.zeros(2), np.zeros(2), t=0.0)
     apart = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
     for engine in ("interpreted", "compiled"):

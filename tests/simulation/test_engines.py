@@ -283,7 +283,7 @@ def test_both_engines_have_the_same_functions() -> None:
     y, p = equation.start(setup.q0, setup.v0)[:, None], np.array([0.0, 1.0])
     results = []
     for engine in (choose(setup), choose(replace(setup, engine="interpreted"))):
-        _, functions, numbers, _ = engine.evaluated(equation, Watch(setup, equation))
+        _, functions, numbers = engine.evaluated(equation, Watch(setup, equation))
         out = {name: np.empty((size, 1)) for name, size in sizes.items()}
         for name, x in out.items():
             getattr(functions, name)(0.2, y, p, numbers[:, None], x)

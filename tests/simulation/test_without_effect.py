@@ -124,14 +124,14 @@ CONTROL = '[control]\nkind = "{}"\nbandwidth_rad_s = 10.0\n'
             SCENE + 'method = "GaussLegendre6"\natol = 1e-8\n',
             "atol: has no effect because GaussLegendre6 has a fixed step",
         ),
-        (SCENE + 2 * GRAVITY, "effect: gravity is named 2 times, but only the last would act; keep one"),
+        (SCENE + 2 * GRAVITY, "effect: gravity appears 2 times, but only the last would act; keep one"),
         (
             SCENE + 2 * '[[effect]]\nkind = "armature"\ninertia_kg_m2 = {joint_1 = 0.1}\n',
-            "effect: armature is named 2 times, but only the last would act",
+            "effect: armature appears 2 times, but only the last would act",
         ),
         (
             SCENE + CONTROL.format("pd_gravity") + 'model = {effects = [{kind = "gravity"}, {kind = "gravity"}]}\n',
-            "control.model.effects: gravity is named 2 times",
+            "control.model.effects: gravity appears 2 times",
         ),
         (
             SCENE + CONTROL.format("pd") + "integral_rate_per_s = 2.0\n",

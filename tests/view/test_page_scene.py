@@ -143,7 +143,7 @@ def test_the_path_is_that_of_the_chosen_frame(view, run, frame: str) -> None:
     shown = view.ask(f"{paths}.filter(([, each]) => each.object.visible).map(([name]) => name)")
     assert shown == ([frame] if frame else [])
     (note,) = (text for text in view.notes() if "path of a frame" in text)
-    stated = float(note.partition("at most ")[2].split()[0]) * 1e-3
+    stated = float(note.partition("accurate to ")[2].split()[0]) * 1e-3
     assert 0 < stated < 2e-3
     line = view.ask(f"[...node('run/paths/{frame or 'tool0'}/<object>').geometry.attributes.position.array]")
     points = np.array(line).reshape(-1, 3)

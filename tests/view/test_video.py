@@ -169,6 +169,6 @@ def test_ffmpeg_is_not_started_where_no_picture_comes(tmp_path: Path, caplog: py
         raise VideoError("none is installed")
         yield b""
 
-    with pytest.raises(VideoError, match="none was found"):
+    with pytest.raises(VideoError, match="none is installed"):
         encoders.encode(without_a_browser(), tmp_path / "run.gif", (320, 240), 25)
     assert not caplog.records

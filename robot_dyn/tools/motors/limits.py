@@ -109,7 +109,8 @@ class Limits:
         """Return the limits with the continuous torque at mean speeds |v| of a motion, (n,)."""
         if self.continuous_line is None:
             return self
-        return replace(self, continuous=np.minimum(self.continuous, self.continuous_line.at(speed)))
+        least = 1e-12  # beyond the no-load speed; as an input, a limit of 0 is refused
+        return replace(self, continuous=np.clip(self.continuous_line.at(speed), least, self.continuous))
 
 
 def limits_of(

@@ -231,7 +231,7 @@ def _check(row: Mapping[str, Any], first: Mapping[str, Any], at: str, *, is_corn
         ),
         (continuous > peak, f"the continuous torque {continuous:.4g} exceeds the peak {peak:.4g}; correct one of them"),
         (
-            row is first and peak < inf and not 1 / _BRAKES <= brake / peak <= _BRAKES,
+            row is first and 0 < peak < inf and not 1 / _BRAKES <= brake / peak <= _BRAKES,
             f"the brake, {brake:.4g}, and the peak, {peak:.4g}, differ by more than a factor of {_BRAKES:g}; give both"
             f" at the {at}",
         ),

@@ -204,6 +204,13 @@ def test_limits_of_bearings_are_judged(files: Path) -> None:
     assert result.joints[1].headroom["bearing"] == pytest.approx(1 - lift.used)
 
 
+def test_the_largest_payload_is_the_mass_that_the_bearing_bears() -> None:
+    """A pendulum at rest: radial load (M + m) g."""
+    bears = Motors({ROD.joint_names[0]: 1e4}, {}, {}, {}, bearing={ROD.joint_names[0]: {"radial": (MASS + 2.5) * G}})
+    most = rd.tools.motors.max_payload(budget(still(np.zeros(1)), ROD, motors=bears), ROD.frame_names[-1])
+    assert most.mass == pytest.approx(2.5, rel=1e-8) and (most.limit, most.at_s) == ("radial load", 0.0)
+
+
 def test_the_command_judges_bearings_and_writes_their_loads(files: Path) -> None:
     done = ran("budget", "ur5", files / "plan.csv", "--limits", files / "motors.csv", "--csv", files / "b.csv")
     assert done.returncode == 1 and "tilting [N m]" in done.stdout

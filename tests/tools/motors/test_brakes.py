@@ -11,7 +11,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import search_box
 from robot_dyn.model import gravity_bound
-from robot_dyn.tools.motors import Motors, read_motors
+from robot_dyn.tools.motors import Motors, max_payload, read_motors
 
 PLANAR = rd.load("planar_2r")
 PLAN = rd.control.quintic([0.1, 0.4], [0.5, -0.2], 0.9)
@@ -52,6 +52,18 @@ def test_a_payload_weighs_on_the_brakes() -> None:
     assert holding
     reach = float(place) - np.linalg.norm(PLANAR.model.jointPlacements[1].translation)
     assert holding.gravity == pytest.approx(G * (m1 * c1 + m2 * (l1 + c2) + 2.0 * reach), rel=1e-9)
+
+
+def test_the_largest_payload_is_the_mass_that_the_brake_holds() -> None:
+    """Brake torque G (m₁ c₁ + m₂ (l₁ + c₂) + m reach), of the straight arm."""
+    (m1, m2), (c1, c2), l1 = planar_arm()
+    frame = PLANAR.frame_names[-1]
+    place = np.linalg.norm(PLANAR.placement(np.zeros(2), frame)[:3, 3])
+    reach = float(place) - np.linalg.norm(PLANAR.model.jointPlacements[1].translation)
+    bare = G * (m1 * c1 + m2 * (l1 + c2))
+    most = max_payload(rd.tools.motors.budget(PLAN, PLANAR, motors=motors(bare + 3.0 * G * reach), effort=1e4), frame)
+    assert most.mass == pytest.approx(3.0, rel=1e-8) and (most.limit, most.joint) == ("brake", PLANAR.joint_names[0])
+    assert max_payload(rd.tools.motors.budget(PLAN, PLANAR, motors=motors(0.9 * bare), effort=1e4), frame).mass is None
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "baxter"])

@@ -15,8 +15,10 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.effects import TorqueSpeed
 from robot_dyn.foundations import EditError, EffectError, PlanError, QueryError
 from robot_dyn.tools.motors import budget, fastest, max_payload
+from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
 from robot_dyn.tools.motors.motor_budget.pace import least_pace
 from tests.command import document, refusal
@@ -383,10 +385,28 @@ def test_the_least_pace_is_the_first_root_of_the_mean_square_though_neither_1_no
     roots = (square - limit**2).roots()
     largest = max(x.real for x in roots if abs(x.imag) < 1e-9 and 0 < x.real < 1)
     plant = rd.Plant(ROD, [rd.effects.ViscousFriction(b)] if b else [])
-    pace = least_pace(SWING, plant, np.array([limit]))
+    pace = least_pace(SWING, plant, Limits(continuous=np.array([limit])))
     assert pace.fits and pace.factor == pytest.approx(1 / largest, rel=1e-6)  # O(h²) of the rule
-    none = least_pace(SWING, plant, np.array([0.9 * np.sqrt(least)]))
+    none = least_pace(SWING, plant, Limits(continuous=np.array([0.9 * np.sqrt(least)])))
     assert not none.fits and none.fraction == pytest.approx(1 / 0.9, rel=1e-3)  # the best of 201 places of an octave
+
+
+def test_the_least_pace_counts_the_continuous_torque_gained_at_its_slower_speed() -> None:
+    """⟨τ²⟩(u) = ℓ(u |v|)² with a falling line ℓ: a polynomial equation between corners of the line."""
+    square, t = np.polynomial.Polynomial(mean_square_of_the_swing(0.3)), np.linspace(0, 0.9, 20_001)
+    speed = np.trapezoid(np.abs(SWING.at(t)[1][:, 0]), t) / 0.9
+    corner, rest = 0.6, 1.02 * np.sqrt(square(0.0))  # the arm can be held at rest, not moved at the first speed
+    line = TorqueSpeed.of_joints({ROD.joint_names[0]: ((corner * speed, rest), (speed, 0.0))}, ROD.joint_names)
+    plant = rd.Plant(ROD, [rd.effects.ViscousFriction(0.3)])
+    pace = least_pace(SWING, plant, Limits(continuous=np.array([rest]), continuous_line=line))
+    falling = rest * np.polynomial.Polynomial([1.0, -1.0]) / (1 - corner)
+    allowed = [
+        x.real
+        for limit, low, high in ((falling, corner, 1.0), (np.polynomial.Polynomial([rest]), 0.0, corner))
+        for x in (square - limit**2).roots()
+        if abs(x.imag) < 1e-9 and low < x.real < high
+    ]
+    assert pace.fits and pace.factor == pytest.approx(1 / max(allowed), rel=1e-6)  # O(h²) of the rule
 
 
 def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
@@ -403,7 +423,7 @@ def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
         tau = np.array([pin.rnea(model, data, q, v, a) for q, v, a in states])
         return float((np.sqrt(np.trapezoid(tau**2, t, axis=0) / t[-1]) / limit).max())
 
-    pace = least_pace(motion, rd.Plant(arm.with_(payload=load)), limit)
+    pace = least_pace(motion, rd.Plant(arm.with_(payload=load)), Limits(continuous=limit))
     assert pace.fits and pace.factor > 1 and share(pace.factor) == pytest.approx(1.0, rel=1e-4)
     assert min(share(each) for each in np.linspace(1.0, 0.999 * pace.factor, 12)) > 1.0 < share(100.0)
 

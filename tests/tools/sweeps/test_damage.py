@@ -26,7 +26,7 @@ pa = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 Damage = Callable[[Path], object]
 ROWS = "rows/000001.parquet"
-AGAIN = "; run the sweep again"
+AGAIN = "; remove this file, then run the sweep again"
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,6 @@ from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.budget import of_plan
-from robot_dyn.tools.motors.motor_budget.demand import of_motion
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.pace import Pace, at_pace, least_pace
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
@@ -107,9 +106,7 @@ def fastest(motor_budget: MotorBudget, fraction: float = 1.0) -> FastestMotion:
     """
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, fraction)
-    mean = of_motion(plan.reference, plant).mean_speed  # at a slower pace, more continuous torque is allowed
-    continuous = limits.at_mean_speed(mean).continuous
-    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, continuous, limits.gear)
+    before, pace = motion.end_s - motion.start_s, least_pace(plan.reference, plant, limits)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
@@ -134,10 +131,10 @@ def _fits(motor_budget: MotorBudget, fraction: float) -> bool:
 def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
     """Return a message about the limit that is exceeded even at the best pace."""
     joint = motor_budget.joints[pace.joint]
-    limit, unit = joint.continuous_limit, of_joint("N m", joint.type)
+    unit = of_joint("N m", joint.type)
     return (
-        f"no pace fits: {joint.joint} needs {pace.fraction * limit:.4g} of {limit:.4g} {unit} rms at the best pace,"
-        f" with {pace.factor:.4g} times the duration"
+        f"no pace fits: {joint.joint} needs {pace.fraction * pace.limit:.4g} of {pace.limit:.4g} {unit} rms at the"
+        f" best pace, with {pace.factor:.4g} times the duration"
     )
 
 

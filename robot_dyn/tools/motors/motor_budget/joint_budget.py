@@ -46,7 +46,7 @@ class JointBudget:
         of_peak: Parts of τ at `peak_at_s` by cause.
         of_rms: Parts of `rms` by cause, 1/(T rms) ∫ τ_cause τ dt; negative for a cause that relieves the motor.
         line: Largest use of the torque–speed line: "torque" in [N m], "speed" in [rad/s], "limit" at that speed,
-            "used", the fraction, and "at_s" in [s]; empty without a line.
+            "used", the factor λ for which (torque, speed)/λ is on the line, and "at_s" in [s]; empty without a line.
         holding: The brake, and the torque of gravity that it holds; None without a brake.
         bearing: Largest loads on its bearing; None if they are unknown.
         cut: True if an effort limit or a torque–speed line cut the actuation of a run, so that the demand was higher.

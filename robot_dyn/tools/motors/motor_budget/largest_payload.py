@@ -10,13 +10,17 @@ not depend on m. Peaks between the times are computed with the current mass and 
 A gear with losses is affine on either side of τ = J a, and increases: the limits of the motor have limits of τ at each
 time. The mean square is then quadratic in m between masses at which a sign changes; its root is found with the signs
 there.
+
+Loads on bearings and holding torques of brakes are convex in m: the masses within these limits are an interval as well,
+whose ends are found by Brent's method.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import count
+from functools import cache
+from importlib import import_module
 from math import inf, nan
 from typing import Any, NamedTuple, final
 
@@ -27,8 +31,10 @@ from robot_dyn.description import LARGEST
 from robot_dyn.foundations import Answer, Block, QueryError
 from robot_dyn.tools.motors.gear import Gear
 from robot_dyn.tools.motors.limits import Limits, used_fraction
+from robot_dyn.tools.motors.motor_budget.bearing_loads import of_plan
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques
+from robot_dyn.tools.motors.motor_budget.holding import holdings
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 
@@ -36,6 +42,7 @@ _ROUNDS = 12
 _INSTEAD = "compute budgets with payload= instead"
 _CLOSE = 1e-9  # relative to a limit, by which a peak between the times may exceed it
 _AFFINE = 1e-9  # relative to the torque, its largest deviation from an affine function
+_NEAR, _ROOT = 1e-6, 1e-9  # distance of a share from 1 that counts as reached; [kg], error of a mass
 _NONE = 1e-12  # relative to the largest torque of a unit mass: smaller torques are rounding
 
 
@@ -51,9 +58,11 @@ class LargestPayload(Answer):
             it.
         least: The smallest mass that fits, in [kg]: 0, unless the arm needs a counterweight.
         joint: The limiting joint; empty if no known limit bounds the mass.
-        limit: The limit: "peak torque", "continuous torque", "break-away torque" or "speed".
-        at_s: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion.
-        largest_share: Largest share of a torque limit with this mass, by inverse dynamics.
+        limit: The limit: "peak torque", "continuous torque", "break-away torque", "speed", "brake", or a load on the
+            bearing, such as "tilting load".
+        at_s: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion, and for
+            brakes.
+        largest_share: Largest share of a limit with this mass, by inverse dynamics.
         resolution: Times of the check with this mass, in words.
         carried: Mass of the arm's payloads, in [kg].
     """
@@ -82,7 +91,7 @@ class LargestPayload(Answer):
             more = f" more, {self.carried + self.mass:.5g} kg in all" if self.carried else ""
             yield f"largest payload {where}: {self.mass:.5g} kg{more}; limited by {limit}"
             least = "all smaller masses fit" if not self.least else f"at least {self.least:.5g} kg are needed"
-            yield f"{least}: torque is affine in a point mass, so each time bounds it in closed form"
+            yield f"{least}: torque is affine in a point mass, and loads on bearings and brakes are convex in it"
             yield (f"with this mass the largest share of a limit is {self.largest_share:.6f}; {self.resolution}")
 
 
@@ -100,7 +109,8 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     """Compute the largest point mass on a link with which the motors suffice, in addition to the arm's payloads.
 
     Torque is affine in the mass, so the masses that fit are an interval, in closed form at each time. The peaks of the
-    torque between times are computed again with this mass, until no limit is exceeded.
+    torque between times are computed again with this mass, until no limit is exceeded. Limits of brakes and bearings
+    may narrow the interval; as in the budget, the torque on a brake is the largest one found.
 
     Args:
         motor_budget: The budget of a plan.
@@ -131,19 +141,67 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
         return result(None, 0.0, _Bound(nan, nan, i, "speed", float(bare.speed[1][i])), inf)
     bounds = [none, *_of_means(bare, plant, loaded, limits), *_of_starts(bare, plant, loaded, limits)]
     bounds += _of_times(bare, plant, loaded, limits, 0.0)
-    for turn in count(1):
+    turn = 0
+    while True:
+        turn += 1
         low, high = max(bounds, key=lambda x: x.least), min(bounds, key=lambda x: x.most)
         least, most = max(0.0, low.least), high.most
-        if most > LARGEST:
-            return result(inf, least, none, 0.0)
         if most < least:
             return result(None, 0.0, high if most < 0 else low, inf)
+        if most > LARGEST:
+            most, high, there, share = inf, none, bare, 0.0
+            break
         there = of_motion(motion, carrying(most), limits)
         share = _share(there, limits)
         if share <= 1 + _CLOSE or turn == _ROUNDS:
-            return result(most, least, high, share, there)
+            break
         bounds += _of_times(there, plant, loaded, limits, most)
-    raise AssertionError
+    if limits.brake or limits.bearing:
+
+        @cache
+        def worst(mass: float) -> _Bound:
+            return _worst_load(of_motion(motion, carrying(mass), limits), carrying(mass), limits)
+
+        least, inside, most = _interval(lambda mass: worst(mass).least, least, min(most, LARGEST))
+        if worst(inside).least > 1 + _CLOSE:
+            return result(None, 0.0, worst(inside), inf)
+        if worst(most).least > 1 - _NEAR:
+            high = worst(most)
+        there = of_motion(motion, carrying(most), limits)
+        share = max(_share(there, limits), worst(most).least)
+    return result(most, least, high, share, there)
+
+
+def _worst_load(demand: Demand, plant: Plant, limits: Limits) -> _Bound:
+    """Return the largest share of a brake or bearing, as `least`, with joint, limit and time."""
+    robot: Any = plant.dynamics
+    assert demand.cells is not None
+    index = robot.joint_names.index
+    shares = [
+        _Bound(x.gravity / x.brake, nan, index(name), "brake") for name, x in holdings(robot, limits.brake).items()
+    ]
+    if limits.bearing:
+        loads = of_plan(demand.cells, plant, limits.bearing).by_joint
+        shares += [
+            _Bound(x.used, nan, index(name), f"{x.worst} load", getattr(x, f"{x.worst}_at_s"))
+            for name, x in loads.items()
+        ]
+    return max(shares, key=lambda x: x.least)
+
+
+def _interval(share: Callable[[float], float], least: float, most: float) -> tuple[float, float, float]:
+    """Return the masses at which a convex share is at most 1: both ends and a mass between."""
+    optimize: Any = import_module("scipy.optimize")
+    inside = min((least, most), key=share)
+    if share(inside) > 1:
+        inside = float(optimize.minimize_scalar(share, bounds=(least, most), method="bounded").x)
+    if share(inside) > 1:
+        return least, inside, most
+    ends = (
+        x if share(x) <= 1 else optimize.brentq(lambda x: share(x) - 1, inside, x, xtol=_ROOT) for x in (least, most)
+    )
+    least, most = (float(x) for x in ends)
+    return least, inside, most
 
 
 def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: float) -> Iterator[_Bound]:
