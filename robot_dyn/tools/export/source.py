@@ -272,7 +272,8 @@ class _Text:
         values = initialiser if start else ""
         values += f"{period}{literal(exported.period_s, self.dtype)}\n" if exported.period_s else ""
         table = (" *   {:20}{:16}{:14}{}".format(*row).rstrip() for row in rows)
-        notes = [f"Right angle at full precision: {x}" for x in exported.right_angles]
+        notes = [*_edits(exported.robot)] if exported.robot else []
+        notes += [f"Right angle at full precision: {x}" for x in exported.right_angles]
         notes += [f"Constant of the code: {_value(x, joint_types)}" for x in exported.constants]
         prototypes = "".join(f"\n/* {_DESCRIPTIONS[x.quantity]} */\n{self.prototype(x)};\n" for x in self.functions)
         return _filled(
@@ -363,6 +364,18 @@ def _value(parameter: Parameter, joint_types: Sequence[str | None]) -> str:
     of = "" if parameter.size == parameter.value.size else f" {list(parameter.entries)}"
     unit = coefficient_unit(parameter.declared, joint_types)
     return f"{parameter.name}{of}: {', '.join(f'{x:g}' for x in values_of(parameter))} {unit}"
+
+
+def _edits(robot: rd.Robot) -> Iterator[str]:
+    """Yield gravity, locked joints and payloads of a robot as text."""
+    edits = robot.edits
+    yield f"Gravity in base axes: {_vector(edits.gravity)} m/s^2"
+    yield from (f"Locked joint: {joint} = {x:.9g}" for joint, x in edits.lock)
+    yield from (f"Payload: {x.mass:.9g} kg on {x.frame} at {_vector(x.com)} m" for x in edits.payloads)
+
+
+def _vector(x: Iterable[float]) -> str:
+    return f"({', '.join(f'{entry:.9g}' for entry in x)})"
 
 
 def _of_array(real: str, name: str, values: np.ndarray, dtype: str) -> str:

@@ -404,3 +404,12 @@ def test_the_command_writes_the_files_and_prints_the_table(tmp_path: Path) -> No
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "planar_2r_dynamics.h", "planar_2r_dynamics.c", "planar_2r_self_test.c", "CMakeLists.txt",
     }  # fmt: skip
+
+
+def test_the_header_states_gravity_locked_joints_and_payloads() -> None:
+    """Of a mount under the ceiling, whose N has the opposite sign."""
+    payload = rd.Payload("tip", 0.7, com=(0.1, 0.0, 0.05))
+    edited = ARM.with_(gravity=(0.0, 0.0, 9.80665), lock={"joint_2": 0.25}, payload=payload)
+    header = Written(c_source(edited, ["N"])).header
+    assert "(0, 0, 9.80665) m/s^2" in header
+    assert "joint_2 = 0.25" in header and "0.7 kg on tip at (0.1, 0, 0.05) m" in header
