@@ -18,9 +18,8 @@ import robot_dyn as rd
 from robot_dyn.effects import TorqueSpeed
 from robot_dyn.foundations import EditError, EffectError, PlanError, QueryError
 from robot_dyn.tools.motors import budget, fastest, max_payload
-from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
-from robot_dyn.tools.motors.motor_budget.pace import least_pace
+from robot_dyn.tools.motors.motor_budget.pace import Limits, least_pace
 from tests.command import document, refusal
 from tests.command import run as ran
 from tests.long import long
