@@ -211,6 +211,14 @@ def test_the_largest_payload_is_the_mass_that_the_bearing_bears() -> None:
     assert most.mass == pytest.approx(2.5, rel=1e-8) and (most.limit, most.at_s) == ("radial load", 0.0)
 
 
+def test_any_payload_fits_where_it_loads_no_limited_bearing() -> None:
+    """A mass at rest on the axis of the pendulum has no moment about it."""
+    bears = Motors({ROD.joint_names[0]: 1e4}, {}, {}, {}, bearing={ROD.joint_names[0]: {"torsion": 1e4}})
+    place = -ROD.placement(np.zeros(1), ROD.frame_names[-1])[:3, 3]
+    most = rd.tools.motors.max_payload(budget(still(np.zeros(1)), ROD, motors=bears), ROD.frame_names[-1], place)
+    assert most.mass == np.inf and (most.limit, most.joint) == ("", "")
+
+
 def test_the_command_judges_bearings_and_writes_their_loads(files: Path) -> None:
     done = ran("budget", "ur5", files / "plan.csv", "--limits", files / "motors.csv", "--csv", files / "b.csv")
     assert done.returncode == 1 and "tilting [N m]" in done.stdout

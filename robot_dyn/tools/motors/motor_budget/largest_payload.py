@@ -130,10 +130,18 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     def carrying(mass: float) -> Plant:
         return replace(plant, dynamics=robot.with_(payload=replace(unit, mass=mass)))
 
-    def result(mass: float | None, least: float, bound: _Bound, share: float, demand: Demand = bare) -> LargestPayload:
+    @cache
+    def demand(mass: float) -> Demand:
+        return of_motion(motion, carrying(mass), limits)
+
+    @cache
+    def worst(mass: float) -> _Bound:
+        return _worst_load(demand(mass), carrying(mass), limits)
+
+    def result(mass: float | None, least: float, bound: _Bound, share: float, there: Demand = bare) -> LargestPayload:
         joint = robot.joint_names[bound.joint] if bound.limit else ""
         limit = joint, bound.limit, bound.at_s
-        return LargestPayload(unit.frame, unit.com, mass, least, *limit, share, demand.resolution, carried)
+        return LargestPayload(unit.frame, unit.com, mass, least, *limit, share, there.resolution, carried)
 
     loaded, none = carrying(1.0), _Bound(-inf, inf)
     if (fast := bare.speed[0] > limits.velocity * (1 + TOLERANCE)).any():
@@ -149,27 +157,21 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
         if most < least:
             return result(None, 0.0, high if most < 0 else low, inf)
         if most > LARGEST:
-            most, high, there, share = inf, none, bare, 0.0
+            most = LARGEST
             break
-        there = of_motion(motion, carrying(most), limits)
-        share = _share(there, limits)
-        if share <= 1 + _CLOSE or turn == _ROUNDS:
+        if _share(demand(most), limits) <= 1 + _CLOSE or turn == _ROUNDS:
             break
-        bounds += _of_times(there, plant, loaded, limits, most)
+        bounds += _of_times(demand(most), plant, loaded, limits, most)
+    share = 0.0
     if limits.brake or limits.bearing:
-
-        @cache
-        def worst(mass: float) -> _Bound:
-            return _worst_load(of_motion(motion, carrying(mass), limits), carrying(mass), limits)
-
-        least, inside, most = _interval(lambda mass: worst(mass).least, least, min(most, LARGEST))
+        least, inside, most = _interval(lambda mass: worst(mass).least, least, most)
         if worst(inside).least > 1 + _CLOSE:
             return result(None, 0.0, worst(inside), inf)
-        if worst(most).least > 1 - _NEAR:
-            high = worst(most)
-        there = of_motion(motion, carrying(most), limits)
-        share = max(_share(there, limits), worst(most).least)
-    return result(most, least, high, share, there)
+        share = worst(most).least
+        high = worst(most) if share > 1 - _NEAR else high
+    if most == LARGEST:
+        return result(inf, least, none, 0.0)
+    return result(most, least, high, max(share, _share(demand(most), limits)), demand(most))
 
 
 def _worst_load(demand: Demand, plant: Plant, limits: Limits) -> _Bound:
