@@ -139,6 +139,10 @@ BROKEN: dict[str, Broken] = {
         _of("elbow", "<limit", '<safety_controller soft_lower_limit="1" soft_upper_limit="-1"/><limit', "joint"),
         "soft_limits", "joint 'elbow'",
     ),
+    "soft limits equal": Broken(
+        _of("elbow", "<limit", '<safety_controller soft_lower_limit="0" soft_upper_limit="0"/><limit', "joint"),
+        "soft_limits", "joint 'elbow'",
+    ),
     "soft limits outside": Broken(
         _of("elbow", "<limit", '<safety_controller soft_lower_limit="-1" soft_upper_limit="2.6"/><limit', "joint"),
         "soft_limits", "joint 'elbow'",

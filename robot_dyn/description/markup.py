@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from math import nan
 from typing import SupportsFloat
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
@@ -46,6 +47,14 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
         f"line {errors[0].line}: uses undeclared prefixes ({listed}); elements and attributes with them are left"
         ' out; declare them: <robot xmlns:PREFIX="…">',
     )
+
+
+def number_of(text: str | None) -> float:
+    """Return the number of a literal; nan if it is not a number."""
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return nan
 
 
 def _without_namespace(root: etree._Element) -> tuple[str, ...]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import isfinite
 from typing import final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.couplings import resolve
+from robot_dyn.description.markup import number_of
 from robot_dyn.description.structure import Structure
 from robot_dyn.foundations.arithmetic import FLOAT64
 
@@ -99,13 +100,13 @@ def _statements(robot: etree._Element) -> Iterator[Statement]:
             yield from _transmission(element)
         elif tag == "joint":
             name = (element.get("name") or "").strip()
-            for child in element:
-                if _local(child) in ("dynamics", "safety_controller"):
+            for tag in ("dynamics", "safety_controller"):  # the first of each counts, as in the reader of URDF
+                if (child := next((x for x in element if _local(x) == tag), None)) is not None:
                     yield from _attributes(name, child)
         elif tag == "gazebo" and (name := (element.get("reference") or "").strip()):
             for child in element.iter():
                 if (quantity := _NAMES.get(_local(child))) is not None:
-                    yield Statement(name, quantity, _number(child.text), f"gazebo> <{_local(child)}")
+                    yield Statement(name, quantity, number_of(child.text), f"gazebo> <{_local(child)}")
 
 
 def _transmission(element: etree._Element) -> Iterator[Statement]:
@@ -124,25 +125,18 @@ def _transmission(element: etree._Element) -> Iterator[Statement]:
 def _attributes(joint: str, element: etree._Element) -> Iterator[Statement]:
     for key, text in element.attrib.items():
         if (quantity := _NAMES.get(key)) is not None:
-            gear = _number(element.get("gear_ratio", "1")) if quantity == ARMATURE else 1.0
-            yield Statement(joint, quantity, gear * gear * _number(text), f"{_local(element)} {key}")
+            gear = number_of(element.get("gear_ratio", "1")) if quantity == ARMATURE else 1.0
+            yield Statement(joint, quantity, gear * gear * number_of(text), f"{_local(element)} {key}")
 
 
 def _content(element: etree._Element) -> float:
     """Return the number of an element: its attribute `value`, as Drake writes it, or its text."""
-    return _number(element.get("value", element.text))
+    return number_of(element.get("value", element.text))
 
 
 def _local(element: etree._Element) -> str:
     """Return the tag without its namespace or undeclared prefix; "" for a comment."""
     return element.tag.rpartition("}")[2].rpartition(":")[2] if isinstance(element.tag, str) else ""
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "")
-    except ValueError:
-        return nan
 
 
 def of_coordinates(robot: Structure, stated: tuple[Statement, ...]) -> dict[str, dict[str, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf
+from math import inf, isnan
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -19,7 +19,7 @@ def within_soft_limits(description: Description) -> Description:
     """Return the description with the position limits of each joint narrowed to its soft limits.
 
     Raises:
-        EditError: If the file states no soft limits, or those of a joint leave no position within its limits.
+        EditError: If the file states no soft limits, or those of a joint are not numbers or leave no position.
     """
     robot, _ = parse(description.text, description.source)
     joints = {
@@ -30,6 +30,8 @@ def within_soft_limits(description: Description) -> Description:
     soft: dict[str, dict[str, float]] = {}
     for item in statements(robot):
         if item.quantity in (LOWER, UPPER) and item.joint in joints:
+            if isnan(item.value):
+                raise EditError(f"joint {item.joint!r}: <{item.element}> is not a number; correct it, or remove it")
             soft.setdefault(item.joint, {})[item.quantity] = item.value
     if not soft:
         raise EditError(f"the file of {description.name} states no soft limits; add <safety_controller> to its joints")
@@ -38,10 +40,10 @@ def within_soft_limits(description: Description) -> Description:
             joint, low, high = joints[name], soft[name].get(LOWER, -inf), soft[name].get(UPPER, inf)
             assert joint.lower is not None and joint.upper is not None  # a moving joint
             lower, upper = max(joint.lower, low), min(joint.upper, high)
-            if not (low <= high and lower <= upper):  # also if one is nan, a text that is not a number
+            if not (low <= high and lower <= upper):
                 raise EditError(
                     f"joint {name!r}: no position is within its soft limits, {low:g} to {high:g}, and its limits,"
-                    f" {joint.lower:g} to {joint.upper:g}; correct its <safety_controller>"
+                    f" {joint.lower:g} to {joint.upper:g}; correct soft_lower_limit or soft_upper_limit"
                 )
             limit = element.find("limit")
             limit = etree.SubElement(element, "limit") if limit is None else limit

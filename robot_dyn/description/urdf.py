@@ -6,13 +6,14 @@ Elements are refused if the two parsers would silently read them differently or 
 from __future__ import annotations
 
 import re
-from math import hypot, inf, isfinite
+from math import hypot, inf, isfinite, isnan
 from typing import NoReturn
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description import connections
 from robot_dyn.description.connections import LARGEST
+from robot_dyn.description.markup import number_of
 from robot_dyn.foundations.errors import DescriptionError, nearest, shorten
 
 MAX_JOINTS = 1000  # Pinocchio crashes the process on chains of some thousands
@@ -261,6 +262,7 @@ class _Check:
             self.refuse(where, f"<axis> xyz must be a direction, got {axis!r}; write a unit vector")
         etree.SubElement(out, "axis", xyz=axis)
         self.limit(joint, out, where)
+        self.soft_limits(joint, where)
         dynamics = self.one(joint, "dynamics", where)
         if dynamics is not None:
             terms = {key: self.number(dynamics, key, where, "0", minimum=0.0) for key in ("damping", "friction")}
@@ -294,3 +296,12 @@ class _Check:
             self.findings.append(f"{where}: {crossed}; both are ignored; exchange them")
             bounds |= unbounded
         etree.SubElement(out, "limit", bounds)
+
+    def soft_limits(self, joint: etree._Element, where: str) -> None:
+        """Report soft limits that are not numbers; they are not copied, because dynamics does not need them."""
+        soft = self.first(joint, "safety_controller", where)
+        for key, text in () if soft is None else soft.items():
+            if key in ("soft_lower_limit", "soft_upper_limit") and isnan(number_of(text)):
+                self.findings.append(
+                    f"{where}: <safety_controller> {key} is {shorten(text)!r}, not a number; correct it, or remove it"
+                )

@@ -488,7 +488,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         `soft_upper` do not need it.
 
         Raises:
-            EditError: If the file states no soft limits, or those of a joint leave no position within its limits.
+            EditError: If the file states no soft limits, or those of a joint are not numbers or leave no position.
         """
         return Robot(within_soft_limits(self.description), self.edits, self.answer_check)
 

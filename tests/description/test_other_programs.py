@@ -167,6 +167,22 @@ def test_soft_limits_without_a_position_are_refused(soft: str) -> None:
         robot(j=f'<safety_controller k_velocity="9" {soft}/>').with_soft_limits()
 
 
+@pytest.mark.parametrize("side", ["lower", "upper"])
+@pytest.mark.parametrize("text", ["abc", "nan", "1,5", ""])
+def test_a_soft_limit_that_is_no_number_is_named_at_load_and_refused(side: str, text: str) -> None:
+    arm = robot(j=f'<safety_controller k_velocity="9" soft_{side}_limit="{text}"/>')
+    assert [x for x in arm.findings if f"soft_{side}_limit" in x and "'j'" in x and "not a number" in x]
+    with pytest.raises(rd.RobotDynError, match=f"'j'.*soft_{side}_limit"):
+        arm.with_soft_limits()
+
+
+def test_the_first_of_two_safety_controllers_counts() -> None:
+    soft = '<safety_controller k_velocity="9" soft_upper_limit="{}"/>'
+    arm = robot(j=soft.format(0.2) + soft.format(0.1))
+    assert arm.soft_upper[0] == arm.with_soft_limits().upper[0] == 0.2
+    assert any("2 <safety_controller>" in finding for finding in arm.findings)
+
+
 def test_what_a_file_does_not_state_is_refused() -> None:
     arm = robot()
     assert arm.statements == ()

@@ -49,7 +49,7 @@ class FindingKind(StrEnum):
     LIMITS_EQUAL = "limits_equal"
     """The lower limit equals the upper one: the joint cannot move."""
     SOFT_LIMITS = "soft_limits"
-    """The soft limits of `<safety_controller>` are crossed, or lie outside the limits of the joint."""
+    """The soft limits of `<safety_controller>` are crossed or equal, or lie outside the limits of the joint."""
     NAME_TWICE = "name_twice"
     """Two links, or two joints, have one name."""
     NAME_BLANKS = "name_blanks"

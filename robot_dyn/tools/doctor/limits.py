@@ -1,4 +1,4 @@
-"""Limits of joints: missing, 0, crossed or negative; soft limits crossed, or outside the limits."""
+"""Limits of joints: missing, 0, crossed or negative; soft limits crossed, equal, or outside the limits."""
 
 from __future__ import annotations
 
@@ -73,6 +73,11 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
             yield document.finding(
                 Severity.WARNING, FindingKind.SOFT_LIMITS, joint,
                 f"its soft lower limit {low:g} is above its soft upper limit {high:g}", "exchange them",
+            )  # fmt: skip
+        elif low == high:
+            yield document.finding(
+                Severity.WARNING, FindingKind.SOFT_LIMITS, joint,
+                f"its soft limits are both {low:g}, which leave no motion", "correct them, or remove them",
             )  # fmt: skip
         elif low < lower or high > upper:
             yield document.finding(
