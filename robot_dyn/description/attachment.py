@@ -37,9 +37,11 @@ def attached(
     instance("prefix", prefix, str, "give text that precedes the names of the gripper, such as 'g_'", error=EditError)
     if not prefix.isprintable():
         raise EditError(f"prefix must be printable text, got {prefix!r}; for example 'g_'")
-    structure = structure_of(gripper, Edits())
+    carrier, structure = structure_of(arm, Edits()), structure_of(gripper, Edits())
+    _refuse(carrier, structure, frame, prefix)
     joint = f"{prefix}{structure.root}_attachment"
-    _refuse(structure_of(arm, Edits()), structure, frame, prefix, joint)
+    while joint in {*carrier.joints, *(prefix + name for name in structure.joints)}:
+        joint += "_"
     (robot, _), (tool, _) = parse(arm.text, arm.source), parse(gripper.text, gripper.source)
     for element in tool.iter(*_NAMES):
         if name := (element.get(_NAMES[element.tag]) or "").strip():
@@ -82,7 +84,7 @@ def attached_edits(arm: Edits, gripper: Edits, description: Description, prefix:
     return replace(arm, payloads=arm.payloads + payloads, **pairs)
 
 
-def _refuse(arm: Structure, gripper: Structure, frame: str, prefix: str, joint: str) -> None:
+def _refuse(arm: Structure, gripper: Structure, frame: str, prefix: str) -> None:
     """Refuse a frame that is not the arm's, a gripper that stands on a moving base, and names that occur twice."""
     if frame not in arm.links:
         if frame.removeprefix(prefix) in gripper.links:
@@ -93,9 +95,8 @@ def _refuse(arm: Structure, gripper: Structure, frame: str, prefix: str, joint: 
             f"the base of the gripper moves, to judge by its links ({', '.join(links[:3])});"
             " attach a robot with a fixed base"
         )
-    for kind, taken, added in (("link", arm.links, gripper.links), ("joint", arm.joints, [*gripper.joints, ""])):
-        names = [prefix + name if name else joint for name in added]
-        if both := [name for name in names if name in taken]:
+    for kind, taken, added in (("link", arm.links, gripper.links), ("joint", arm.joints, gripper.joints)):
+        if both := [prefix + name for name in added if prefix + name in taken]:
             other = next(text for text in ("g_", "gripper_", "tool_", "attached_") if text != prefix)
             raise EditError(
                 f"both robots have a {kind} {both[0]!r}{f', and {len(both) - 1} more' if both[1:] else ''};"

@@ -186,6 +186,19 @@ def test_a_gripper_that_cannot_be_attached_is_refused_with_a_remedy(case: str) -
         rd.load("ur5").attach(rd.load(gripper), **options)
 
 
+def test_the_joint_of_the_mount_has_a_name_of_no_other_joint() -> None:
+    """A tool whose own joint is named like the mount, in a URDF that is read again."""
+    tool = '<robot name="t"><link name="w"/><link name="tip">{}</link>{}</robot>'
+    joint = '<joint name="w_attachment" type="fixed"><parent link="w"/><child link="tip"/></joint>'
+    body = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    finger = joint.replace("fixed", "prismatic").replace(
+        "/></j", '/><limit lower="0" upper="1" effort="9" velocity="9"/></j'
+    )
+    both = rd.load("ur5").attach(rd.Robot.from_text(tool.format(body, finger)), frame="tool0", prefix="g_")
+    assert "g_w_attachment" in both.joint_names
+    assert rd.Robot.from_text(both.description.xml).joint_names == both.joint_names
+
+
 def test_gravity_of_the_gripper_alone_is_refused() -> None:
     arm, gripper = rd.load("ur5"), rd.load("planar_2r")
     with pytest.raises(EditError):
